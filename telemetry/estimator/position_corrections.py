@@ -143,8 +143,7 @@ class PositionCorrections:
     ) -> Corrected:
         """Correct a filter already predicted to the fix, which lies at `xy_m` (2,)."""
         std, white = self.noise.std_m(fix), self.noise.white_std_m(fix)
-        wander = self.noise.wanders(fix)
-        if wander:
+        if wander := self.noise.wanders(fix):
             filter_.expect_wander(std)
         wheels = self._measured.fresh("speed_mps", fix.stamp_ns)
         unturned = not self._measured.tells_turning(fix.stamp_ns)
@@ -203,7 +202,8 @@ class PositionCorrections:
                 filter_.stand(_STANDING_SPEED_STD_MPS, _STANDING_ACCEL_STD_MPS2)
                 filter_.calm = 1.0  # it may pull away at any time
         if not standing and (unfelt or (wheels and unturned)) and sparse(self._gate.recent):
-            follow_fixes(filter_, self._gate.recent, white, turning=unturned, pace=not wheels)
+            apart = self.noise.apart_std_m(fix)
+            follow_fixes(filter_, self._gate.recent, apart, turning=unturned, pace=not wheels)
         if standing:
             filter_.mean[YAW] = yaw_before
             return Corrected(standing)

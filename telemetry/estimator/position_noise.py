@@ -159,6 +159,17 @@ class PositionNoise:
         # This share is nobody's word: where surprises cannot tell, as much as they leave open.
         return max(white, self._seen_beyond(white), min(self._untold_m, std))
 
+    def apart_std_m(self, fix: GnssFix) -> float:
+        """Return the white noise by which a fix differs as much from the one before as it does.
+
+        A slow error, too, is another one after a second: by 3 m alike over 30 s, 0.8 m.
+        """
+        white = self.white_std_m(fix)
+        if not self.wanders(fix) or len(self._last) < 2:
+            return white
+        changed = -math.expm1(-(self._last[-1].time_s - self._last[-2].time_s) / GNSS_CORRELATION_S)
+        return math.hypot(white, self.std_m(fix) * math.sqrt(changed))
+
     def most_std_m(self, fix: GnssFix) -> float:
         """Return how far off a fix may be whatever it states: ten times what such fixes jitter."""
         return max(self.std_m(fix), math.sqrt(self._jitter_m2 or 0.0) / _WHITE_SHARE)

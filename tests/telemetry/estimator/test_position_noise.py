@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
 
@@ -91,6 +93,14 @@ def test_a_receiver_that_states_nothing_may_be_metres_off_until_it_has_hardly_ji
     assert driven(0.03).hidden_std_m(fix()) == 2.0
     assert driven(0.6, rate_hz=1.0).hidden_std_m(fix()) == pytest.approx(6.0, rel=0.5)
     assert driven(0.03).hidden_std_m(fix(0.02)) == 0.0, "that is as large as it states"
+
+
+def test_a_slow_error_is_another_one_by_the_next_fix() -> None:
+    """Of two fixes a second apart, each with an error of 3 m that stays alike over 30 s."""
+    difference_m = math.sqrt(2.0 * 3.0**2 * (1.0 - math.exp(-1.0 / 30.0)) + 2.0 * 0.3**2)
+    apart_m = driven(0.0, rate_hz=1.0).apart_std_m(fix(3.0))
+    assert apart_m == pytest.approx(difference_m / math.sqrt(2.0))
+    assert driven(0.0, rate_hz=1.0).apart_std_m(fix(0.3)) == 0.3
 
 
 def test_a_receiver_that_loses_its_corrections_is_metres_off_once_it_has_shown_that() -> None:
