@@ -134,9 +134,9 @@ class PositionCorrections:
 
     def at_its_word(self, fix: GnssFix, *, alone: bool) -> bool:
         """Whether a fix is passed on unchanged; `alone` where nothing else tells of the motion."""
-        if self._doubted or self.noise.std_m(fix) > _PASSED_ON_M:
-            return False
-        return fix.std_m is None or alone
+        unstated = fix.std_m is None
+        noise_m = (self.noise.seen_m or 0.0) if unstated and alone else self.noise.std_m(fix)
+        return not self._doubted and noise_m <= _PASSED_ON_M and (unstated or alone)
 
     def correct(
         self, filter_: KinematicFilter, fix: GnssFix, xy_m: Array, *, aid: MapAid, standing: bool

@@ -13,7 +13,7 @@ from foretwin.contracts.arrays import Array
 from foretwin.contracts.bus import ZenohBus
 from foretwin.contracts.errors import UserError
 from foretwin.contracts.foreign_bus import ZenohForeignBus
-from foretwin.contracts.frames import local_from_geo
+from foretwin.contracts.frames import geo_from_local, local_from_geo
 from foretwin.contracts.ports import free_endpoint
 from foretwin.contracts.setup import BusSetup
 from foretwin.contracts.vehicle import VehicleParameters
@@ -38,6 +38,21 @@ LANE = AnchorFile(world=ANCHOR.world)
 ROAD = load_vehicle(None)
 
 
+def surveyed(folder: Path, xy: Array) -> Path:
+    """Write positions once a second, which say that they are good to 1 cm."""
+    geo = geo_from_local(town().graph.frame, xy)
+    rows = "".join(f"{k},{lat:.9f},{lon:.9f},0.01\n" for k, (lat, lon) in enumerate(geo))
+    file = folder / "drive.csv"
+    file.write_text(f"t,lat,lon,std\n{rows}")
+    Path(f"{file}.toml").write_text(
+        'reference_point = "rear axle"\n'
+        '[time]\ncolumn = "t"\nunit = "s"\nbase = "log"\n'
+        '[position]\nframe = "wgs84"\nlatitude = { column = "lat", unit = "deg" }\n'
+        'longitude = { column = "lon", unit = "deg" }\nstd = { column = "std", unit = "m" }\n'
+    )
+    return file
+
+
 def test_a_recorded_drives_lot_is_where_it_is_first_settled(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -45,7 +60,7 @@ def test_a_recorded_drives_lot_is_where_it_is_first_settled(
 
     The run's folder keeps the whole anchor, and a drive with that file is the same.
     """
-    log, lane = gpx(tmp_path, town_line()[::8]), tmp_path / "lane.toml"
+    log, lane = surveyed(tmp_path, town_line()[::8]), tmp_path / "lane.toml"
     lane.write_text(WORLD.format(AnchorPose(lat_deg=45.0, lon_deg=-30.0, yaw_deg=0.0)))
     settings = {"map": str(MAP_FILE), "log": str(log)}
     elsewhere = first_pose.with_first_pose(

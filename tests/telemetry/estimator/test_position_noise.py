@@ -95,6 +95,13 @@ def test_a_receiver_that_states_nothing_may_be_metres_off_until_it_has_hardly_ji
     assert driven(0.03).hidden_std_m(fix(0.02)) == 0.0, "that is as large as it states"
 
 
+def test_fixes_too_seldom_to_tell_noise_from_jerks_are_not_taken_for_precise() -> None:
+    """Once a second a car that brakes in bends leaves 0.9 m beyond the quadratic, noise or not."""
+    found = [driven(0.5, rate_hz=1.0, seed=seed).std_m(fix()) for seed in range(12)]
+    assert 0.2 < np.median(found) < 1.0
+    assert driven(0.5, rate_hz=1.0).std_m(fix(0.3)) == 0.3, "that is not disproved"
+
+
 def test_a_slow_error_is_another_one_by_the_next_fix() -> None:
     """Of two fixes a second apart, each with an error of 3 m that stays alike over 30 s."""
     difference_m = math.sqrt(2.0 * 3.0**2 * (1.0 - math.exp(-1.0 / 30.0)) + 2.0 * 0.3**2)

@@ -111,8 +111,12 @@ def test_wheels_are_believed_beside_fixes_that_jump_about_a_car_that_pulls_away(
     assert estimator.left_out == frozenset()
 
 
-def test_speeds_of_fixes_whose_error_wanders_are_told_as_unsure_as_they_are() -> None:
-    """By a second later 3 m of error have changed by 0.8 m: 7 of 10 speeds were within 95 %."""
+@pytest.mark.parametrize("stated_m", [3.0, None])
+def test_speeds_of_fixes_whose_error_wanders_are_told_as_unsure_as_they_are(
+    stated_m: float | None,
+) -> None:
+    """By a second later 3 m of error have changed by 0.8 m: 76 of 100 speeds were within 95 %, and
+    47 where nothing is stated and that was taken for what the car jerks."""
     within = []
     for seed in range(6):
         estimator, random = StateEstimator(info()), np.random.default_rng(seed)
@@ -120,9 +124,9 @@ def test_speeds_of_fixes_whose_error_wanders_are_told_as_unsure_as_they_are() ->
         for second in range(SECONDS):
             off_m = stays * off_m + math.sqrt(1.0 - stays**2) * random.normal(0.0, 3.0, 2)
             x_m, y_m = off_m + random.normal(0.0, 0.3, 2)
-            state = estimator.handle(*fix(float(second), SPEED_MPS * second + x_m, y_m, 3.0))
+            state = estimator.handle(*fix(float(second), SPEED_MPS * second + x_m, y_m, stated_m))
             if state is not None and second >= 30:
                 assert state.speed_std_mps is not None
                 within.append(abs(state.speed_mps - SPEED_MPS) < 1.96 * state.speed_std_mps)
 
-    assert np.mean(within) > 0.85
+    assert np.mean(within) > (0.85 if stated_m else 0.65)
