@@ -54,7 +54,8 @@ class TelemetryCount:
     def settle(self, published: dict[str, int]) -> None:
         """Count what the vehicle says it published and that never came, first samples included."""
         missing = sum(
-            max(0, published.get(name, 0) - self.by_channel[name]) for name in SAMPLE_CHANNELS
+            max(0, published.get(name, 0) - self.by_channel.get(name, 0))
+            for name in SAMPLE_CHANNELS
         )
         self.lost_before = max(self.lost_before, missing - self.numbers.missing.total())
 
