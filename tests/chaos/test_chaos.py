@@ -127,7 +127,7 @@ def test_processes_of_a_drive_are_found_by_what_it_tells(tmp_path: Path) -> None
         finally:
             assert len(end_all(mark)) == 5
         wait_for(lambda: not is_running(worker.pid), "its end")
-    assert marked(mark) == []
+    wait_for(lambda: marked(mark) == [], "the end of all")
 
 
 @pytest.mark.skipif(os.geteuid() != 0 or shutil.which("mount") is None, reason="may mount nothing")
