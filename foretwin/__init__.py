@@ -8,7 +8,7 @@ What a notebook needs, each name loaded when it is first used:
     world = town.world(town.intersections[0].id)
     way = foretwin.ways_through(world)[0]
     futures = foretwin.run_futures(world, way, foretwin.state_on(world, way), count=32)
-    futures.table["min_clearance_m"]
+    futures.table["progress_m"]  # and "min_clearance_m", where others come near
 
 Metres, seconds, radians; x east, y north in a World's own frame, yaw counter-clockwise from east.
 A car's pose is that of its rear axle's centre on the ground. Mistakes in what is given are
