@@ -149,3 +149,8 @@ def test_a_cut_has_the_length_asked_for(begin, span):
 def test_an_offset_keeps_the_nodes_of_short_steps():
     line = np.array([[0.0, 0.0], [10.0, 0.0], [10.1, 0.0], [20.0, 0.0]])
     np.testing.assert_allclose(offset(line, 2.0), line + np.array([0.0, 2.0]))
+
+
+def test_no_points_have_no_length() -> None:
+    assert length(np.empty((0, 2))) == 0.0
+    assert length(np.ones((1, 2))) == 0.0

@@ -10,10 +10,14 @@ from foretwin.geometry.frenet_path import FrenetPath
 from foretwin.sim_worker.batch.batch_simulation import BatchSimulation
 from foretwin.sim_worker.futures.run_job import run_job
 from foretwin.sim_worker.scenarios.live import KnownScenarios
+from foretwin.sim_worker.scenarios.placement import PassageFinder
 from foretwin.sim_worker.scenarios.reading import catalogue
-from foretwin.sim_worker.scenarios.roads import RoadNetwork
+from foretwin.sim_worker.scenarios.roads import Passage, RoadNetwork
 from foretwin.sim_worker.vehicle.parameters import load_vehicle
+from foretwin.world_gen.build import build_region
+from foretwin.world_gen.roads.build_graph import build_road_graph
 from tests.sim_worker.places import crossroads, happening, job, state_at, straight_path
+from tests.world_gen.drawn_maps import STREET, drawn_map
 
 
 @pytest.fixture(scope="module")
@@ -74,3 +78,23 @@ def test_what_can_take_place_is_ahead_of_the_car(x: float, speed: float, left: s
     asked = [catalogue()[id_] for id_ in ("occluded_pedestrian", "cccscp", "lead_stopping", "ltip")]
     found = on.ahead(asked, ego_arc_m=x + 60.0, ego_speed_mps=speed)
     assert {one.id for one in found} == left
+
+
+def test_of_two_junctions_on_a_path_the_next_one_counts() -> None:
+    nodes = {n: (80.0 * n, 0.0) for n in range(-2, 4)} | {10: (0.0, 90.0), 11: (80.0, 90.0)}
+    street = list(range(-2, 4))
+    osm = drawn_map(nodes, [(1, street, STREET), (2, [0, 10], STREET), (3, [1, 11], STREET)])
+    roads = RoadNetwork(build_region(osm, build_road_graph(osm), osm.bounds))
+    finder = PassageFinder(roads)
+
+    def next_junctions(passage: Passage, *arcs_m: float) -> list[str]:
+        way = roads.way(passage)
+        begin, end = way.path.point_at(np.array([way.entry_m, way.exit_m]))
+        whole = FrenetPath(begin + np.linspace(-6.0, 8.0, 250)[:, None] * (end - begin))
+        found = [finder.first_on(whole, arc_m) for arc_m in arcs_m]
+        return [passage.junction_id for passage in found if passage is not None]
+
+    straight = [p for p in roads.passages("n0") if p.turn == "straight"]
+    east, west = sorted(straight, key=lambda passage: abs(passage.exit_heading_rad))
+    assert next_junctions(east, 5.0, 125.0) == ["n0", "n1"]
+    assert next_junctions(west, 5.0, 50.0, 125.0) == ["n1", "n0"]
