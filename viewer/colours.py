@@ -12,8 +12,6 @@ NOMINAL: Colour = (250, 250, 255)
 ROAD_USER: Colour = (214, 112, 214)
 DETECTED: Colour = (206, 190, 150)
 """Of who is really there, as the car says."""
-SEEN_FOR_NS = 1_000_000_000
-"""So long who was detected is shown."""
 VIRTUAL: Colour = (255, 150, 60)
 """Of who exists in a going simulation alone."""
 
@@ -31,3 +29,6 @@ PAGE: dict[str, Colour] = {
 }
 """What the co-pilot display takes of them, by the names of its style sheet; calm has no colour
 there, so that who cannot tell red from green misses nothing."""
+
+SEEN_FOR_NS = 1_000_000_000
+"""So long who was detected is shown."""
