@@ -24,7 +24,7 @@ from foretwin.telemetry.estimator.map_aid import MapAid
 from foretwin.telemetry.estimator.measured import MotionSamples
 from foretwin.telemetry.estimator.motion_noise import CALMEST
 from foretwin.telemetry.estimator.position_gate import LocalFix, PositionGate
-from foretwin.telemetry.estimator.position_noise import PositionNoise
+from foretwin.telemetry.estimator.position_noise import PositionNoise, stated_m
 from foretwin.telemetry.estimator.shallow_copy import shallow_copy
 from foretwin.telemetry.estimator.slow_motion import drift_sideways, limit_turn
 from foretwin.telemetry.estimator.sparse_fixes import bear_anew, follow_fixes, sparse, turned_m
@@ -134,7 +134,7 @@ class PositionCorrections:
 
     def at_its_word(self, fix: GnssFix, *, alone: bool) -> bool:
         """Whether a fix is passed on unchanged; `alone` where nothing else tells of the motion."""
-        unstated = fix.std_m is None
+        unstated = stated_m(fix) is None
         noise_m = (self.noise.seen_m or 0.0) if unstated and alone else self.noise.std_m(fix)
         return not self._doubted and noise_m <= _PASSED_ON_M and (unstated or alone)
 

@@ -28,6 +28,7 @@ LEAST_STD_M = 0.012
 """No receiver on a moving car is better (NovAtel OEM7 with RTK: 1 cm + 1 ppm)."""
 WANDER_M = 0.5
 """From this stated error on, a receiver has no corrections, and its error wanders slowly."""
+_LEAST_STATED_M, _MOST_STATED_M = 1e-3, 1e4
 _WHITE_SHARE = 0.1
 """Of the stated error of a receiver that wanders: what changes from fix to fix."""
 _SHOWN, _SURELY = 25, 50
@@ -56,6 +57,13 @@ class _TimedPlace(NamedTuple):
     time_s: float
     x_m: float
     y_m: float
+
+
+def stated_m(fix: GnssFix) -> float | None:
+    """Return the error that a fix states, within what one may be; None where it states none."""
+    if fix.std_m is None or not math.isfinite(fix.std_m):
+        return None
+    return min(max(fix.std_m, _LEAST_STATED_M), _MOST_STATED_M)
 
 
 class PositionNoise:
@@ -136,12 +144,11 @@ class PositionNoise:
 
     def std_m(self, fix: GnssFix) -> float:
         """Return one standard deviation of a fix on each axis, all that is known together."""
-        if fix.std_m is None or not math.isfinite(fix.std_m):
-            if self.seen_m is None:
-                return UNKNOWN_STD_M
-            return max(self.seen_m, self._untold_m, LEAST_STD_M)
-        stated = min(max(fix.std_m, 1e-3), 1e4)
-        return max(stated, self._seen_beyond(stated))
+        if (stated := stated_m(fix)) is not None:
+            return max(stated, self._seen_beyond(stated))
+        if self.seen_m is None:
+            return UNKNOWN_STD_M
+        return max(self.seen_m, self._untold_m, LEAST_STD_M)
 
     def still_std_m(self, fix: GnssFix) -> float:
         """Return how far its fixes jitter about a car that stands, as they have done lately.
@@ -158,7 +165,7 @@ class PositionNoise:
         std = self.std_m(fix)
         if not self.wanders(fix):
             return std
-        white = _WHITE_SHARE * min(max(fix.std_m or 0.0, 1e-3), 1e4)
+        white = _WHITE_SHARE * (stated_m(fix) or _LEAST_STATED_M)
         if self.seen_m is not None and self._jerked_m < _CLEAR * white:
             return max(self.seen_m, LEAST_STD_M)
         # This share is nobody's word: where surprises cannot tell, as much as they leave open.
@@ -185,8 +192,7 @@ class PositionNoise:
         None of those without corrections jitters as little as one that has them, and what jitters
         is a tenth of how far it is off. So this is 0 once it has shown that it is one of these.
         """
-        stated = fix.std_m is not None and math.isfinite(fix.std_m)
-        if stated or self._precise > 0:
+        if stated_m(fix) is not None or self._precise > 0:
             return 0.0
         return max(UNSEEN_STD_M, self.most_std_m(fix))
 
@@ -194,7 +200,7 @@ class PositionNoise:
         """Return a white noise that is surely no smaller: beyond it fixes contradict a sensor."""
         if self.seen_m is not None:
             return self.white_std_m(fix)
-        return UNSEEN_STD_M if fix.std_m is None else self.std_m(fix)
+        return UNSEEN_STD_M if stated_m(fix) is None else self.std_m(fix)
 
     def _seen_beyond(self, stated_m: float) -> float:
         """Return what was seen where it gives the lie to `stated_m`, 0 elsewhere."""
@@ -203,7 +209,7 @@ class PositionNoise:
 
     def wanders(self, fix: GnssFix) -> bool:
         """Whether the receiver itself says that it is rough: then its error wanders slowly."""
-        return (fix.std_m or 0.0) >= WANDER_M
+        return (stated_m(fix) or 0.0) >= WANDER_M
 
 
 def _beyond_quadratic(a: float, b: float, c: float, d: float) -> list[float] | None:

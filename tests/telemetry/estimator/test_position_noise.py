@@ -132,3 +132,14 @@ def test_where_the_filter_knows_well_surprises_show_good_fixes() -> None:
     for away_m in np.hypot(*random.normal(0.0, 0.02, (2, 24))):
         noise.surprised(float(away_m), 0.02**2)
     assert noise.std_m(fix()) == LEAST_STD_M
+
+
+@pytest.mark.parametrize("none", [math.inf, math.nan])
+def test_an_error_that_is_no_number_is_none_that_is_stated(none: float) -> None:
+    for noise in (PositionNoise(), driven(0.02), driven(1.0)):
+
+        def told(std_m: float | None, of: PositionNoise = noise) -> tuple[object, ...]:
+            ways = (of.std_m, of.white_std_m, of.hidden_std_m, of.sure_white_std_m, of.wanders)
+            return tuple(way(fix(std_m)) for way in ways)
+
+        assert told(none) == told(None)
