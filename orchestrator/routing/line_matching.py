@@ -15,7 +15,7 @@ from foretwin.orchestrator.routing.road_hypotheses import (
     first_hypotheses,
     next_hypotheses,
 )
-from foretwin.orchestrator.routing.road_index import NearEdge, RoadIndex, key_of
+from foretwin.orchestrator.routing.road_index import NearEdge, RoadIndex
 from foretwin.orchestrator.routing.route import Route, RouteError
 from foretwin.orchestrator.routing.shortest_paths import ShortestWays
 from foretwin.orchestrator.routing.spurs import EdgeVisit, without_spurs
@@ -142,7 +142,7 @@ def _trace(layers: Sequence[list[Hypothesis]], first: int) -> list[_Piece]:
         if not hypothesis.connected:
             pieces.append(_Piece(tuple(without_spurs(visits)), start, number - 1))
             visits, start = [_visit(step)], number
-        elif hypothesis.via or key_of(step.directed_edge) != key_of(last.edge):
+        elif hypothesis.via or step.directed_edge.key != last.edge.key:
             visits += _driven_onto(last, hypothesis)
         last = visits[-1]
         last.to_m = max(last.to_m, step.s_m)

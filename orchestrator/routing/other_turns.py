@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping
 
 from foretwin.orchestrator.routing.junctions_ahead import UpcomingJunction
-from foretwin.orchestrator.routing.road_index import key_of, reach
+from foretwin.orchestrator.routing.road_index import reach
 from foretwin.world_gen.junctions.intersections import Junction
 from foretwin.world_gen.roads.road_graph import DirectedEdge, RoadGraph
 
@@ -34,7 +34,7 @@ class OtherTurns:
 
     def _beyond(self, start: DirectedEdge, horizon_m: float) -> list[tuple[Junction, float]]:
         """Return the junctions' nodes reached from the end of `start`, with their distances."""
-        memory = (*key_of(start), horizon_m)
+        memory = (*start.key, horizon_m)
         if self._memory is None or self._memory[0] != memory:
             nodes = [(start.end_node, 0.0)]
             for found in reach(self._graph, start, limit_m=horizon_m, legal_only=True).values():

@@ -13,14 +13,12 @@ from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 from foretwin.orchestrator.routing.road_index import (
-    EdgeKey,
     NearEdge,
     Reached,
     RoadIndex,
-    key_of,
     legality,
 )
-from foretwin.world_gen.roads.road_graph import DirectedEdge
+from foretwin.world_gen.roads.road_graph import DirectedEdge, EdgeKey
 
 SEARCH_RADIUS_M = 40.0
 BEGIN_RADIUS_M = 25.0
@@ -120,7 +118,7 @@ def _transition(
                 options.append(_Arrival(_DETOUR_PER_M * abs(max(ahead, 0.0) - moved_m), (), True))
         else:
             options.append(_Arrival(_U_TURN, (), True))
-    found = reached.get(key_of(new_edge))
+    found = reached.get(new_edge.key)
     if found is not None:
         rest_m = max(0.0, old_edge.edge.length_m - old.s_m)
         driven_m = rest_m + found.gap_m + new.s_m

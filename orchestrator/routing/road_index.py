@@ -10,10 +10,7 @@ import numpy as np
 import shapely
 
 from foretwin.contracts.arrays import Array
-from foretwin.world_gen.roads.road_graph import DirectedEdge, RoadGraph
-
-EdgeKey = tuple[int, bool]
-"""Index of an edge and whether it is driven in reverse."""
+from foretwin.world_gen.roads.road_graph import DirectedEdge, EdgeKey, RoadGraph
 
 NOT_FOR_CARS_FACTOR = 2.0
 AGAINST_ONE_WAY_FACTOR = 4.0
@@ -24,16 +21,11 @@ REACH_M = 80.0
 _MOST_KNOWN = 2000
 
 
-def key_of(directed: DirectedEdge) -> EdgeKey:
-    """Return the hashable identity of a directed edge (its geometry is a numpy array)."""
-    return directed.edge.index, directed.reverse
-
-
 def legality(directed: DirectedEdge) -> str:
     """Say whether a car may drive here: car, no_car_road, or against_one_way."""
     if directed.allowed:
         return "car" if directed.edge.car else "no_car_road"
-    if DirectedEdge(directed.edge, not directed.reverse).allowed:
+    if directed.back.allowed:
         return "against_one_way"
     return "no_car_road"
 
@@ -121,7 +113,7 @@ class RoadIndex:
                     forth.heading_rad + math.pi,
                 )
             )
-        result.sort(key=lambda near: (near.distance_m, key_of(near.directed_edge)))
+        result.sort(key=lambda near: (near.distance_m, near.directed_edge.key))
         return result
 
     def _off_loose_end(self, near: NearEdge) -> bool:
@@ -138,7 +130,7 @@ class RoadIndex:
         """Return what can be reached from the end of `start`, without turning round in the road."""
         if limit_m is not None and limit_m > REACH_M:
             return reach(self.graph, start, limit_m=limit_m)
-        key = key_of(start)
+        key = start.key
         if key not in self._reached:
             while len(self._reached) >= _MOST_KNOWN:
                 del self._reached[next(iter(self._reached))]
@@ -170,7 +162,7 @@ def reach(
     push(start, 0.0, 0.0, ())
     while queue:
         effort, _, gap, step, via = heapq.heappop(queue)
-        key = key_of(step)
+        key = step.key
         if key in result:
             continue
         result[key] = Reached(step, gap, effort, via)

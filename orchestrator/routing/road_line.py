@@ -17,11 +17,11 @@ from foretwin.contracts.drive import VehicleState
 from foretwin.contracts.frames import GeoPoint, geo_from_local, geo_from_local_yaw, wrap_angle
 from foretwin.geometry.polyline import arc_lengths
 from foretwin.orchestrator.routing.map_matching import Match
-from foretwin.orchestrator.routing.road_index import EdgeKey, NearEdge, key_of, legality
+from foretwin.orchestrator.routing.road_index import NearEdge, legality
 from foretwin.orchestrator.routing.route import Route
 from foretwin.telemetry.estimator.map_aid import RoadLine
 from foretwin.world_gen.lanes.cross_section import cross_section
-from foretwin.world_gen.roads.road_graph import DirectedEdge, RoadGraph
+from foretwin.world_gen.roads.road_graph import DirectedEdge, EdgeKey, RoadGraph
 
 EVERY_M = 5.0
 MAP_STD_M = 1.2
@@ -77,7 +77,7 @@ class RoadLines:
         place = route.index_at(s_m)
         if not match.confident or legality(edge) != "car":
             return None
-        if key_of(route.edges[place]) != key_of(edge) or self._turns(state, match):
+        if route.edges[place].key != edge.key or self._turns(state, match):
             return None
         course = _straight(route, s_m)
         side = self._side(edge)
@@ -104,7 +104,7 @@ class RoadLines:
         return abs(match.heading_off_rad) > min(_MOST_OFF_RAD + doubt, _MOST_OFF_EVER_RAD)
 
     def _side(self, directed: DirectedEdge) -> _LateralPosition:
-        key = key_of(directed)
+        key = directed.key
         if key not in self._sides:
             while len(self._sides) >= _MOST_KNOWN:
                 del self._sides[next(iter(self._sides))]

@@ -12,8 +12,8 @@ from foretwin.contracts.arrays import Array
 from foretwin.contracts.errors import UserError
 from foretwin.contracts.frames import wrap_angle
 from foretwin.geometry.polyline import points_at
-from foretwin.orchestrator.routing.road_index import key_of, legality
-from foretwin.world_gen.roads.road_graph import DirectedEdge, RoadGraph
+from foretwin.orchestrator.routing.road_index import legality
+from foretwin.world_gen.roads.road_graph import DirectedEdge, EdgeKey, RoadGraph
 
 HEADING_OVER_M = 15.0
 """Headings at a node are measured over this length: nearer, maps draw junctions with kinks."""
@@ -142,12 +142,12 @@ def extend_most_probable(graph: RoadGraph, route: Route, *, until_m: float) -> R
     """
     edges = list(route.edges)
     end_m = route.end_m
-    driven: dict[tuple[int, bool], int] = {}
+    driven: dict[EdgeKey, int] = {}
     while end_m < until_m:
         following = most_probable_next(graph, tuple(edges[-4:]))
         if following is None:
             break
-        key = key_of(following)
+        key = following.key
         driven[key] = driven.get(key, 0) + 1
         if driven[key] > 2:
             break

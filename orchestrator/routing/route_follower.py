@@ -15,7 +15,7 @@ from foretwin.orchestrator.routing.map_matching import Match
 from foretwin.orchestrator.routing.other_turns import OtherTurns
 from foretwin.orchestrator.routing.passages import Passages
 from foretwin.orchestrator.routing.place_on_route import FoundOnRoute, as_likely, locate
-from foretwin.orchestrator.routing.road_index import RoadIndex, key_of
+from foretwin.orchestrator.routing.road_index import RoadIndex
 from foretwin.orchestrator.routing.route import Route, extend_most_probable
 from foretwin.orchestrator.routing.turning import TURNING_RAD, route_with_turn, turns_back
 from foretwin.world_gen.junctions.intersections import Junction
@@ -141,7 +141,7 @@ class RouteFollower:
         rest_m = float(self._route.start_m[self._place + 1]) - self._s_m
         starts = [(edge, rest_m)]
         if not self._direction_known:
-            starts.append((DirectedEdge(edge.edge, not edge.reverse), edge.edge.length_m - rest_m))
+            starts.append((edge.back, edge.edge.length_m - rest_m))
         known = {ahead.junction.summary.id for ahead in self.upcoming(horizon_m)}
         nearest: dict[str, UpcomingJunction] = {}
         for met in self._other_turns.junctions(starts, horizon_m=horizon_m):
@@ -197,7 +197,7 @@ class RouteFollower:
     def _leaving(self, match: Match) -> bool:
         """Whether the car has left its route: the match is sure, or stays off for a while."""
         first = self._doubt
-        if first is None or key_of(first.directed_edge) != key_of(match.directed_edge):
+        if first is None or first.directed_edge.key != match.directed_edge.key:
             self._doubt = first = match
         return match.confident or abs(match.s_on_edge_m - first.s_on_edge_m) > PATIENCE_M
 
@@ -206,7 +206,7 @@ class RouteFollower:
         assert self._route is not None
         # That it was left shows late: the edge where it was is the one before.
         self._given_from = max(0, self.place.given_place - self._on_given)
-        key = key_of(match.directed_edge)
+        key = match.directed_edge.key
         best: tuple[float, int, tuple[DirectedEdge, ...]] | None = None
         for place in range(max(0, self._place - 3), min(self._place + 3, len(self._route.edges))):
             reached = self._index.reached(self._route.edges[place]).get(key)

@@ -15,7 +15,6 @@ from foretwin.orchestrator.routing.line_matching import match_line
 from foretwin.orchestrator.routing.road_index import (
     NearEdge,
     RoadIndex,
-    key_of,
     legality,
     project,
 )
@@ -57,11 +56,11 @@ class WayFinder:
         else:
             at_start = self._on_road(start, "start")
             edges, from_m = (at_start.directed_edge,), at_start.s_m
-        passed = [key_of(one) for one in edges]
+        passed = [one.key for one in edges]
         # A goal behind on the first road is come to by driving round.
-        behind = int(passed[0] == key_of(at_goal.directed_edge) and at_goal.s_m < from_m)
-        if key_of(at_goal.directed_edge) in passed[behind:]:
-            last = passed.index(key_of(at_goal.directed_edge), behind)
+        behind = int(passed[0] == at_goal.directed_edge.key and at_goal.s_m < from_m)
+        if at_goal.directed_edge.key in passed[behind:]:
+            last = passed.index(at_goal.directed_edge.key, behind)
             return FoundWay(Route(edges[: last + 1]), planned_m)
         rest = self._ways.between(edges[-1], at_goal.directed_edge)
         if rest is None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import rustworkx
 
-from foretwin.orchestrator.routing.road_index import U_TURN_M, key_of, legality, travel_factor
+from foretwin.orchestrator.routing.road_index import U_TURN_M, legality, travel_factor
 from foretwin.world_gen.roads.road_graph import DirectedEdge, RoadGraph
 from foretwin.world_gen.roads.turn_restrictions import TurnRestrictions
 
@@ -26,7 +26,7 @@ class ShortestWays:
         self._network = rustworkx.PyDiGraph()
         edges = [edge for node in graph.node_xy_m for edge in graph.at_node(node)]
         numbers = self._network.add_nodes_from(edges)
-        self._number = dict(zip(map(key_of, edges), numbers, strict=True))
+        self._number = dict(zip((edge.key for edge in edges), numbers, strict=True))
         for number, edge in zip(numbers, edges, strict=True):
             self._join(number, edge)
 
@@ -35,7 +35,7 @@ class ShortestWays:
 
         A goal that is the start is come to by driving round.
         """
-        here, there = self._network.add_node(start), self._number[key_of(goal)]
+        here, there = self._network.add_node(start), self._number[goal.key]
         self._join(here, start)
         paths = rustworkx.dijkstra_shortest_paths(
             self._network, here, target=there, weight_fn=float
@@ -49,7 +49,7 @@ class ShortestWays:
         """Lead from a node of the network, of this edge, onto those that follow it."""
         onto = self._graph.at_node(before.end_node)
         self._network.add_edges_from(
-            [(number, self._number[key_of(after)], self._effort_m(before, after)) for after in onto]
+            [(number, self._number[after.key], self._effort_m(before, after)) for after in onto]
         )
 
     def _effort_m(self, before: DirectedEdge, after: DirectedEdge) -> float:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from foretwin.orchestrator.routing.map_matching import Match
-from foretwin.orchestrator.routing.road_index import key_of, legality
+from foretwin.orchestrator.routing.road_index import legality
 from foretwin.orchestrator.routing.route import Route, turn_angle
 from foretwin.world_gen.roads.road_graph import RoadGraph
 
@@ -41,7 +41,7 @@ def route_with_turn(
         if side * turn_angle(before, edges[number + 1]) > TURNING_RAD:
             return None
         fitting = [
-            (side * turn_angle(before, option), key_of(option), option)
+            (side * turn_angle(before, option), option.key, option)
             for option in graph.at_node(edges[number].end_node)
             if legality(option) == "car"
             and option.edge.index != edges[number].edge.index

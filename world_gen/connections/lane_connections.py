@@ -18,7 +18,7 @@ from foretwin.world_gen.lanes.cluster import Cluster
 from foretwin.world_gen.lanes.clusters import Surroundings
 from foretwin.world_gen.lanes.lane_curves import LaneDraft, LaneSet
 from foretwin.world_gen.lanes.lane_plans import LanePlan
-from foretwin.world_gen.roads.road_graph import DirectedEdge
+from foretwin.world_gen.roads.road_graph import DirectedEdge, EdgeKey
 
 _UNDRAWN = np.zeros((0, 2))
 
@@ -74,7 +74,7 @@ def connect(
     found: list[ConnectionDraft] = []
     side = around.driving_side
     merging = merges(cluster, ways, side)
-    by_road: dict[tuple[int, bool], list[Movement]] = {}
+    by_road: dict[EdgeKey, list[Movement]] = {}
     for way in ways:
         by_road.setdefault(way.toward.key, []).append(way)
     for mine in by_road.values():

@@ -14,7 +14,7 @@ from foretwin.geometry.bends import MIN_STEP_M
 from foretwin.world_gen.lanes.cluster import Cluster
 from foretwin.world_gen.lanes.clusters import Surroundings
 from foretwin.world_gen.lanes.legs import Heads, dot, heading_out, is_ring_edge, opposed
-from foretwin.world_gen.roads.road_graph import DirectedEdge
+from foretwin.world_gen.roads.road_graph import DirectedEdge, EdgeKey
 from foretwin.world_gen.roads.turn_restrictions import TurnRestrictions
 
 STRAIGHT_RAD = math.radians(45.0)
@@ -82,8 +82,8 @@ def _ways_through(
     for leg in cluster.legs:
         if leg.allowed:
             exits.setdefault(leg.start_node, []).append(leg)
-    best: dict[tuple[int, bool], tuple[DirectedEdge, tuple[DirectedEdge, ...]]] = {}
-    done: set[tuple[int, bool]] = set()
+    best: dict[EdgeKey, tuple[DirectedEdge, tuple[DirectedEdge, ...]]] = {}
+    done: set[EdgeKey] = set()
     queue: list[tuple[float, int, DirectedEdge, tuple[DirectedEdge, ...]]] = [(0.0, 0, toward, ())]
     count = 0
     while queue:

@@ -17,7 +17,7 @@ from foretwin.world_gen.driven.matching import UNKNOWN, LaneLine, Lines, PassMat
 from foretwin.world_gen.driven.passes import STEP_M, Pass
 from foretwin.world_gen.driven.road_shifts import Seen, moved_roads
 from foretwin.world_gen.lanes.lane_curves import LaneDraft, LaneSet
-from foretwin.world_gen.roads.road_graph import RoadEdge
+from foretwin.world_gen.roads.road_graph import EdgeKey, RoadEdge
 
 _TURN_RAD = math.radians(20.0)
 _BESIDE_TURN_M = 6.0
@@ -36,7 +36,7 @@ class Driven(msgspec.Struct, frozen=True):
 
     roads: Mapping[int, RoadEdge]
     passes: Mapping[str, Sequence[Array]]
-    trims_m: Mapping[tuple[int, bool], float]
+    trims_m: Mapping[EdgeKey, float]
     """How much of roads drivers need for their turns, by (edge index, at its end node)."""
     widths: Mapping[int, float]
     """How many times as wide lanes are, by edge index."""
@@ -70,7 +70,7 @@ def driven(
     lanes: LaneSet,
     connections: Sequence[ConnectionDraft],
     passes: Iterable[Pass],
-    trims_m: Mapping[tuple[int, bool], float],
+    trims_m: Mapping[EdgeKey, float],
 ) -> Driven:
     """Match passes to the lanes that the map alone gives, and return where these were driven.
 
@@ -80,7 +80,7 @@ def driven(
     lines = Lines(_lines(lanes.lanes, links))
     seen: list[Seen] = []
     through: dict[str, list[Array]] = {}
-    asked: dict[tuple[int, bool], float] = {}
+    asked: dict[EdgeKey, float] = {}
     for one in passes:
         match = lines.match(one)
         ids = ["" if i == UNKNOWN else lines.ids[i] for i in match.line.tolist()]

@@ -18,6 +18,7 @@ from foretwin.geometry.polyline_batch import Polylines, points_at
 from foretwin.world_gen.connections.lane_connections import ConnectionDraft
 from foretwin.world_gen.lanes.clusters import Surroundings
 from foretwin.world_gen.lanes.lane_curves import LaneSet
+from foretwin.world_gen.roads.road_graph import EdgeKey
 
 CORNER_STEPS = 6
 SHARPEST_CORNER_M = 0.3
@@ -56,7 +57,7 @@ def simple_outlines(
     for i, cluster in enumerate(around.clusters):
         if len(cluster.nodes) > 1 or cluster.ring or cluster.inner:
             continue
-        mine = [row_of.get((leg.edge.index, leg.reverse), -1) for leg in cluster.legs]
+        mine = [row_of.get(leg.key, -1) for leg in cluster.legs]
         if -1 not in mine:
             rows.append(i)
             mouths += mine
@@ -78,9 +79,9 @@ def simple_outlines(
     return PlaceOutlines(tuple(rows[k] for k in kept), shapes[kept])
 
 
-def _road_ends(lanes: LaneSet) -> tuple[dict[tuple[int, bool], int], _Mouths]:
+def _road_ends(lanes: LaneSet) -> tuple[dict[EdgeKey, int], _Mouths]:
     """Return the mouths of all roads, and the row of that at each end of an edge with a place."""
-    row_of: dict[tuple[int, bool], int] = {}
+    row_of: dict[EdgeKey, int] = {}
     edges: list[Array] = []
     for road in lanes.roads:
         if not road.lane_ids:

@@ -147,7 +147,7 @@ def _stubs_and_inner_edges(
         if i in done:
             continue
         for leg in cluster.legs:
-            trim = around.trims_m.get((leg.edge.index, leg.reverse), 0.0)
+            trim = around.trims_m.get(leg.key, 0.0)
             if trim >= 0.05:
                 section = around.section(leg)
                 left, right = section.left_m, section.right_m
@@ -173,7 +173,7 @@ def _node_discs(around: Surroundings, done: frozenset[int]) -> tuple[np.ndarray,
     """Return a round piece where the legs of a cluster of one node meet at an angle."""
     centres, radii, owners = [], [], []
     for i, cluster in enumerate(around.clusters):
-        bent = any(around.trims_m.get((d.edge.index, d.reverse), 0.0) for d in cluster.legs)
+        bent = any(around.trims_m.get(d.key, 0.0) for d in cluster.legs)
         if i in done or not bent or len(cluster.nodes) > 1:
             continue
         halves = sorted(around.section(leg).width_m / 2 for leg in cluster.legs)

@@ -11,7 +11,7 @@ import msgspec
 import numpy as np
 
 from foretwin.world_gen.osm.osm_map import OsmMap
-from foretwin.world_gen.roads.road_graph import DirectedEdge, RoadEdge, RoadGraph
+from foretwin.world_gen.roads.road_graph import DirectedEdge, EdgeKey, RoadEdge, RoadGraph
 from foretwin.world_gen.roads.road_tags import RING_TAGS, is_car_road
 
 Tags = Mapping[str, str]
@@ -151,7 +151,7 @@ class _Walk:
             end = begin + len(edge.node_ids)
             self._span[edge.index] = begin, end
             begin = end
-        self._known: dict[tuple[int, bool], Chain] = {}
+        self._known: dict[EdgeKey, Chain] = {}
 
     def chain(self, first: DirectedEdge) -> Chain:
         """Return the chain that begins with an edge."""

@@ -29,7 +29,7 @@ from foretwin.world_gen.lanes.transitions import transition_shifts
 from foretwin.world_gen.lanes.trims import trims
 from foretwin.world_gen.roads.joined_edges import read_tags
 from foretwin.world_gen.roads.node_notes import barrier_notes, level_crossing_notes, level_notes
-from foretwin.world_gen.roads.road_graph import DirectedEdge, RoadEdge, country_of, side_of
+from foretwin.world_gen.roads.road_graph import DirectedEdge, EdgeKey, RoadEdge, country_of, side_of
 from foretwin.world_gen.roads.turn_restrictions import restriction_notes
 
 _REPEAT_M = 0.01
@@ -51,7 +51,7 @@ class Surroundings(msgspec.Struct, frozen=True, kw_only=True):
     edges: Mapping[int, RoadEdge]
     sections: Mapping[int, CrossSection]
     clusters: tuple[Cluster, ...]
-    trims_m: Mapping[tuple[int, bool], float]
+    trims_m: Mapping[EdgeKey, float]
     """Metres cut off an edge's lanes by (edge index, at its end node)."""
     heads: Heads
     """Where every leg of a cluster leaves it."""
@@ -92,7 +92,7 @@ def surroundings(
     made_for: tuple[Junction, ...],
     *,
     moved: Mapping[int, RoadEdge] = MappingProxyType({}),
-    least_trims_m: Mapping[tuple[int, bool], float] = MappingProxyType({}),
+    least_trims_m: Mapping[EdgeKey, float] = MappingProxyType({}),
     widths: Mapping[int, float] = MappingProxyType({}),
 ) -> Surroundings:
     """Collect the roads within `extent` of the frame's origin and cluster their nodes.
@@ -154,7 +154,7 @@ class _Layout(NamedTuple):
     clusters: tuple[Cluster, ...]
     shifts_m: Mapping[int, tuple[float, float]]
     heads: Heads
-    trims_m: Mapping[tuple[int, bool], float]
+    trims_m: Mapping[EdgeKey, float]
 
 
 def _laid(
@@ -163,7 +163,7 @@ def _laid(
     joined: JoinedRoads,
     edges: Mapping[int, RoadEdge],
     extent: Extent,
-    least_trims_m: Mapping[tuple[int, bool], float] = MappingProxyType({}),
+    least_trims_m: Mapping[EdgeKey, float] = MappingProxyType({}),
     widths: Mapping[int, float] = MappingProxyType({}),
 ) -> _Layout:
     sections = _sections(index, edges)
@@ -215,7 +215,7 @@ def _side_notes(edges: Mapping[int, RoadEdge], side: DrivingSide) -> list[str]:
 def _beyond_notes(
     made_for: tuple[Junction, ...],
     edges: Mapping[int, RoadEdge],
-    trims_m: Mapping[tuple[int, bool], float],
+    trims_m: Mapping[EdgeKey, float],
     extent: Extent,
 ) -> Iterator[str]:
     """Name the ways in and out of the junctions in `made_for` whose lanes begin beyond."""

@@ -12,7 +12,7 @@ from foretwin.geometry.polyline_batch import Polylines, cut, without_repeats
 from foretwin.world_gen.lanes.cluster import Cluster
 from foretwin.world_gen.lanes.lane_plans import CrossSection
 from foretwin.world_gen.lanes.legs import Heads, dot, is_ring_edge
-from foretwin.world_gen.roads.road_graph import DirectedEdge
+from foretwin.world_gen.roads.road_graph import DirectedEdge, EdgeKey
 
 LOOK_M = 300.0
 """A branch that has not left the other road by then runs beside it, closer than its lanes are
@@ -24,7 +24,7 @@ FLAT_COS = 0.7
 
 def fork_trims(
     clusters: Iterable[Cluster], sections: Mapping[int, CrossSection], heads: Heads
-) -> dict[tuple[int, bool], float]:
+) -> dict[EdgeKey, float]:
     """Return metres cut off branches, by (edge index, at its end node).
 
     Maps draw a ramp from the middle of the road that it leaves. Its lanes begin where they lie
@@ -38,7 +38,7 @@ def fork_trims(
     lines = cut(lines, np.zeros(len(lines)), np.minimum(lines.length_m, LOOK_M))
     ways = shapely.linestrings(lines.xy_m, indices=lines.line)
     branches, roads = ways[::2], ways[1::2]
-    found: dict[tuple[int, bool], float] = {}
+    found: dict[EdgeKey, float] = {}
     for (branch, road), line, other in zip(pairs, branches, roads, strict=True):
         room_m = sum(sections[leg.edge.index].half_width_m for leg in (branch, road))
         at_m = np.arange(0.0, line.length, _STEP_M)

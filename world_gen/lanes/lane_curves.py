@@ -18,7 +18,7 @@ from foretwin.world_gen.lanes.clusters import Surroundings
 from foretwin.world_gen.lanes.lane_plans import CrossSection, LanePlan
 from foretwin.world_gen.lanes.places import places_led_through, without_dead_places
 from foretwin.world_gen.lanes.reference_lines import Stretch, reference_lines
-from foretwin.world_gen.roads.road_graph import DirectedEdge, RoadEdge
+from foretwin.world_gen.roads.road_graph import DirectedEdge, EdgeKey, RoadEdge
 from foretwin.world_gen.roads.road_tags import in_tunnel, on_bridge
 
 Role = Literal["approach", "exit", "ring", "other"]
@@ -216,9 +216,9 @@ def _line(points: Array) -> Array:
     return points if len(points) > 1 else np.repeat(points, 2, axis=0)
 
 
-def _roles(around: Surroundings) -> dict[tuple[int, bool], Role]:
+def _roles(around: Surroundings) -> dict[EdgeKey, Role]:
     """Return the role of lanes by (edge index, reverse)."""
-    roles: dict[tuple[int, bool], Role] = {}
+    roles: dict[EdgeKey, Role] = {}
     on_ring = {n for c in around.clusters if c.whole and c.ring for n in c.nodes}
     inner = around.inner_edges
     for cluster in around.clusters:

@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping
 
 from foretwin.world_gen.lanes.lane_plans import CrossSection
-from foretwin.world_gen.roads.road_graph import DirectedEdge, RoadEdge
+from foretwin.world_gen.roads.road_graph import DirectedEdge, EdgeKey, RoadEdge
 
 _PARTED_M = 25.0
 _BESIDE_COS = math.cos(math.radians(30.0))
@@ -18,7 +18,7 @@ def is_ring_edge(edge: RoadEdge) -> bool:
     return edge.tags.get("junction") in RING_KINDS
 
 
-Heads = Mapping[tuple[int, bool], tuple[float, float]]
+Heads = Mapping[EdgeKey, tuple[float, float]]
 """Unit directions in which legs leave, by (edge index, reverse)."""
 
 

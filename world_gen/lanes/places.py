@@ -13,13 +13,13 @@ from foretwin.world_gen.extent import MIN_PIECE_M, Extent
 from foretwin.world_gen.junctions.intersections import Junction
 from foretwin.world_gen.lanes.cluster import Cluster
 from foretwin.world_gen.lanes.legs import opposed
-from foretwin.world_gen.roads.road_graph import DirectedEdge
+from foretwin.world_gen.roads.road_graph import DirectedEdge, EdgeKey
 
 
 def places_led_through(
-    legs: Mapping[tuple[int, bool], tuple[str, DirectedEdge]],
-    begins: Iterable[tuple[int, bool]],
-    ends: Iterable[tuple[int, bool]],
+    legs: Mapping[EdgeKey, tuple[str, DirectedEdge]],
+    begins: Iterable[EdgeKey],
+    ends: Iterable[EdgeKey],
 ) -> frozenset[str]:
     """Return the places where a lane of one road ends and a lane of another goes on.
 
@@ -57,7 +57,7 @@ def without_dead_places(roads: Iterable[Road], led_through: frozenset[str]) -> I
 def whole_where_led_through(
     clusters: tuple[Cluster, ...],
     made_for: tuple[Junction, ...],
-    trims_m: Mapping[tuple[int, bool], float],
+    trims_m: Mapping[EdgeKey, float],
     extent: Extent,
 ) -> tuple[Cluster, ...]:
     """Return the clusters, none whole of junctions that no road leads through before the edge."""

@@ -16,7 +16,7 @@ from foretwin.world_gen.lanes.lane_plans import CrossSection
 from foretwin.world_gen.lanes.legs import Heads, dot, heading_out, is_ring_edge, lateral_positions
 from foretwin.world_gen.lanes.stopping import NodeTags, before_crossings_m, stop_line_m
 from foretwin.world_gen.lanes.turning_room import turning_trims
-from foretwin.world_gen.roads.road_graph import DirectedEdge, RoadEdge
+from foretwin.world_gen.roads.road_graph import DirectedEdge, EdgeKey, RoadEdge
 
 CORNER_M = 3.5
 """Room between the kerb of the other road and a lane's end."""
@@ -47,16 +47,16 @@ def trims(
     sections: Mapping[int, CrossSection],
     shifts_m: Mapping[int, tuple[float, float]],
     heads: Heads,
-    driven_m: Mapping[tuple[int, bool], float],
+    driven_m: Mapping[EdgeKey, float],
     node_tags: NodeTags,
-) -> dict[tuple[int, bool], float]:
+) -> dict[EdgeKey, float]:
     """Return metres cut off an edge's lanes by (edge index, at its end node).
 
     `driven_m` are such metres by which cars were seen to have begun to turn.
     """
-    least: dict[tuple[int, bool], float] = {}
-    wanted: dict[tuple[int, bool], float] = {}
-    tapers_m: dict[tuple[int, bool], float] = {}
+    least: dict[EdgeKey, float] = {}
+    wanted: dict[EdgeKey, float] = {}
+    tapers_m: dict[EdgeKey, float] = {}
     by_size: dict[int, list[tuple[Cluster, Array]]] = {}
     wide = [cluster for cluster in clusters if len(cluster.nodes) > 1]
     areas = dict(zip([c.key for c in wide], _area_trims(wide, edges, sections), strict=True))
@@ -106,8 +106,8 @@ def _stop_m(
 
 
 def _share(
-    least: Mapping[tuple[int, bool], float],
-    wanted: dict[tuple[int, bool], float],
+    least: Mapping[EdgeKey, float],
+    wanted: dict[EdgeKey, float],
     edges: Mapping[int, RoadEdge],
 ) -> None:
     """Let both ends of short edges want no more than leaves a lane between them."""
@@ -165,7 +165,7 @@ def _tapers_m(
     sections: Mapping[int, CrossSection],
     shifts_m: Mapping[int, tuple[float, float]],
     node_tags: NodeTags,
-) -> dict[tuple[int, bool], float]:
+) -> dict[EdgeKey, float]:
     """Return what the lanes of both legs give way, by leg, so that none has to swerve.
 
     What one leg has no room for the other one gives.

@@ -63,6 +63,10 @@ class RoadEdge(msgspec.Struct, frozen=True, kw_only=True):
         return self.car and (self.forward or self.backward) and self.length_m > 0.05
 
 
+EdgeKey = tuple[int, bool]
+"""Index of an edge and whether it is driven in reverse."""
+
+
 class DirectedEdge(NamedTuple):
     """An edge with the direction in which it is driven."""
 
@@ -70,8 +74,8 @@ class DirectedEdge(NamedTuple):
     reverse: bool
 
     @property
-    def key(self) -> tuple[int, bool]:
-        """(edge index, reverse): what stands for it in tables."""
+    def key(self) -> EdgeKey:
+        """What stands for it in tables (its geometry is a numpy array)."""
         return self.edge.index, self.reverse
 
     @property

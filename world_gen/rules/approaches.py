@@ -20,7 +20,7 @@ from foretwin.world_gen.lanes.stopping import (
     OWN_LINE_M,
     NodeTags,
 )
-from foretwin.world_gen.roads.road_graph import DirectedEdge
+from foretwin.world_gen.roads.road_graph import DirectedEdge, EdgeKey
 from foretwin.world_gen.roads.road_tags import is_crossed
 from foretwin.world_gen.rules.control_devices import (
     Met,
@@ -61,7 +61,7 @@ class Approach(msgspec.Struct, kw_only=True):
     line_m: float | None
     signal_nodes: tuple[int, ...]
     standing: Standing
-    opposite: tuple[int, bool] | None = None
+    opposite: EdgeKey | None = None
     """Key of the approach that lies straight ahead."""
     lit_inside: bool = False
     """Its light stands on the way through the junction, past where a slip road may part."""
@@ -75,7 +75,7 @@ class Approach(msgspec.Struct, kw_only=True):
         return junction.summary.id if junction is not None else ""
 
     @property
-    def key(self) -> tuple[int, bool]:
+    def key(self) -> EdgeKey:
         """(edge index, reverse) of the road as it is driven toward the junction."""
         return self.toward.key
 
@@ -106,7 +106,7 @@ def approaches(
     where they have a sign.
     """
     tagged_on = passed_on(around.edges, node_tags)
-    inside: dict[tuple[int, bool], list[Met]] = {}
+    inside: dict[EdgeKey, list[Met]] = {}
     for connection in connections:
         if connection.cluster.whole and connection.movement.inside:
             met = inside.setdefault(connection.movement.toward.key, [])

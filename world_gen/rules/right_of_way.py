@@ -41,6 +41,7 @@ from foretwin.geometry.polyline import arc_lengths, locate
 from foretwin.geometry.polyline_batch import Polylines
 from foretwin.world_gen.connections.conflicts import Meetings, meetings
 from foretwin.world_gen.connections.lane_connections import ConnectionDraft
+from foretwin.world_gen.roads.road_graph import EdgeKey
 from foretwin.world_gen.rules.approaches import Approach
 from foretwin.world_gen.rules.priority_roads import Rank, Standing, has_priority, importance
 from foretwin.world_gen.rules.signs_inside import SignsInside
@@ -70,8 +71,8 @@ class ConnectionFacts(msgspec.Struct, kw_only=True):
     bend_rad: float
     """How far it turns in all."""
     length_m: float
-    road: tuple[int, bool]
-    opposite: tuple[int, bool] | None
+    road: EdgeKey
+    opposite: EdgeKey | None
     """The road into the junction that lies straight ahead."""
     on_ring: bool
     standing: Standing
@@ -147,7 +148,7 @@ def _ways(
     signs: SignsInside,
     driving_side: DrivingSide,
 ) -> list[ConnectionFacts]:
-    by_road: dict[tuple[int, bool], Approach] = {item.key: item for item in found}
+    by_road: dict[EdgeKey, Approach] = {item.key: item for item in found}
     near = "right" if driving_side == "right" else "left"
     weight: Mapping[str, int] = {"straight": 0, near: 1, "u_turn": 3}
     plain = Standing(Rank.PLAIN, "near_side", "default")

@@ -13,6 +13,7 @@ from foretwin.contracts.signals import Signal
 from foretwin.contracts.world import DrivingSide, StopLine
 from foretwin.world_gen.lanes.clusters import Surroundings
 from foretwin.world_gen.lanes.lane_curves import LaneDraft
+from foretwin.world_gen.roads.road_graph import EdgeKey
 from foretwin.world_gen.rules.signal_groups import LaneGroup
 
 BESIDE_HEIGHT_M, ABOVE_HEIGHT_M = 3.0, 5.5
@@ -31,7 +32,7 @@ def signal_heads(
     and any group of a wide road, a head above its lanes.
     """
     driving_side = around.driving_side
-    by_road: dict[tuple[int, bool], list[LaneDraft]] = {}
+    by_road: dict[EdgeKey, list[LaneDraft]] = {}
     for group in groups:
         by_road.setdefault(group.approach.key, []).extend(group.lanes)
     heads: list[Signal] = []

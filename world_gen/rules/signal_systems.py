@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 from foretwin.world_gen.lanes.cluster import Cluster
 from foretwin.world_gen.lanes.clusters import Surroundings
-from foretwin.world_gen.roads.road_graph import DirectedEdge
+from foretwin.world_gen.roads.road_graph import DirectedEdge, EdgeKey
 from foretwin.world_gen.rules.signal_groups import LaneGroup
 
 NEAR_M = 60.0
@@ -33,7 +33,7 @@ def signal_systems(
     leads from one to the other.
     """
     cluster_at = {node: cluster for cluster in around.clusters for node in cluster.nodes}
-    let_go: dict[tuple[int, bool], list[tuple[str, LaneGroup]]] = {}
+    let_go: dict[EdgeKey, list[tuple[str, LaneGroup]]] = {}
     for name, mine in groups.items():
         for group in mine:
             for away in {c.movement.away.key for c in group.connections}:

@@ -16,7 +16,7 @@ from foretwin.world_gen.connections.lane_connections import ConnectionDraft
 from foretwin.world_gen.lanes.cluster import Cluster
 from foretwin.world_gen.lanes.clusters import Surroundings
 from foretwin.world_gen.lanes.stopping import NodeTags, faces
-from foretwin.world_gen.roads.road_graph import DirectedEdge
+from foretwin.world_gen.roads.road_graph import DirectedEdge, EdgeKey
 from foretwin.world_gen.rules.control_devices import sign_of
 
 _BESIDE_M = 1.0
@@ -66,14 +66,14 @@ def signs_inside(
 
 def shared_signs(
     connections: Sequence[ConnectionDraft], signs: SignsInside, driving_side: DrivingSide
-) -> dict[tuple[int, bool], YieldRule]:
+) -> dict[EdgeKey, YieldRule]:
     """Return the sign that all ways from a road pass, by its (edge index, reverse).
 
     Such a sign is the road's own. One of the ways turns to the near side: in a median, which
     those who so turn do not reach, a sign is for what lies behind it.
     """
-    passed: dict[tuple[int, bool], dict[int, SignInside]] = {}
-    near: set[tuple[int, bool]] = set()
+    passed: dict[EdgeKey, dict[int, SignInside]] = {}
+    near: set[EdgeKey] = set()
     for c in connections:
         if not c.cluster.whole or c.turn == "u_turn":
             continue

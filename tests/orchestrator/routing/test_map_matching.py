@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from foretwin.contracts.frames import geo_from_local
 from foretwin.orchestrator.routing.line_matching import match_line
 from foretwin.orchestrator.routing.map_matching import MapMatcher, Match
-from foretwin.orchestrator.routing.road_index import RoadIndex, key_of
+from foretwin.orchestrator.routing.road_index import RoadIndex
 from foretwin.orchestrator.routing.route import RouteError
 from foretwin.world_gen.roads.build_graph import build_road_graph
 from foretwin.world_gen.roads.road_graph import RoadGraph
@@ -38,7 +38,7 @@ def follow(
 
 
 def roads(matches: list[Match | None]) -> list[tuple[int, bool]]:
-    keys = [key_of(match.directed_edge) for match in matches if match]
+    keys = [match.directed_edge.key for match in matches if match]
     return [key for number, key in enumerate(keys) if number == 0 or key != keys[number - 1]]
 
 
@@ -101,7 +101,7 @@ def test_standing_still_without_heading_leaves_the_direction_open_until_the_car_
 
     assert moving is not None
     assert moving.direction_known
-    assert key_of(moving.directed_edge) == (0, True)
+    assert moving.directed_edge.key == (0, True)
 
 
 def test_leaving_the_map_ends_the_match_and_returning_begins_it_again() -> None:
@@ -196,7 +196,7 @@ def test_a_line_becomes_its_roads() -> None:
     matched = match_line(TOWN, geo_from_local(TOWN.frame, xy), index=INDEX)
 
     (route,) = matched.routes
-    assert [key_of(edge) for edge in route.validate().edges] == [
+    assert [edge.key for edge in route.validate().edges] == [
         (0, False), (1, False), (13, False), (14, False),
     ]  # fmt: skip
     assert matched.near_road_share == 1.0

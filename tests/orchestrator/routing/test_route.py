@@ -2,7 +2,6 @@ from __future__ import annotations
 
 import pytest
 
-from foretwin.orchestrator.routing.road_index import key_of
 from foretwin.orchestrator.routing.route import Route, RouteError, extend_most_probable, turn_angle
 from foretwin.world_gen.roads.road_graph import DirectedEdge
 from tests.orchestrator.grid_map import graph_of, grid, road
@@ -15,7 +14,7 @@ def forward(*indices: int) -> Route:
 
 
 def keys(route: Route) -> list[tuple[int, bool]]:
-    return [key_of(edge) for edge in route.edges]
+    return [edge.key for edge in route.edges]
 
 
 def test_positions_count_from_the_origin() -> None:

@@ -10,7 +10,7 @@ import pytest
 
 from foretwin.contracts.drive import RoutePose
 from foretwin.contracts.frames import GeoPoint, geo_from_local
-from foretwin.orchestrator.routing.road_index import RoadIndex, key_of
+from foretwin.orchestrator.routing.road_index import RoadIndex
 from foretwin.orchestrator.routing.route import Route, RouteError
 from foretwin.orchestrator.routing.route_to_goal import WayFinder, away_m
 from foretwin.world_gen.roads.road_graph import RoadGraph
@@ -49,7 +49,7 @@ def test_the_way_leads_from_start_to_goal_and_is_the_shortest() -> None:
     found = finder().find(pose(20.0, 2.0, EAST), pose(298.0, 150.0, NORTH), planned_deg=None)
     assert found.planned_m == 0.0
     assert found.route.end_m == pytest.approx(5 * BLOCK_M)
-    assert key_of(found.route.edges[0]) == (0, False)
+    assert found.route.edges[0].key == (0, False)
     assert found.route.edges[-1].edge.name == "Column 3"
     assert away_m(found.route, np.array([298.0, 150.0])) == pytest.approx(2.0)
 
@@ -66,19 +66,19 @@ def test_the_plan_decides_where_it_leads_away_from_the_shortest_way() -> None:
 def test_a_goal_that_the_plan_reaches_ends_the_route() -> None:
     plan = degrees((20.0, 0.0), (100.0, 0.0), (300.0, 0.0))
     found = finder().find(pose(20.0, 0.0, EAST), pose(150.0, 0.0, EAST), planned_deg=plan)
-    assert [key_of(one) for one in found.route.edges] == [(0, False), (1, False)]
+    assert [one.key for one in found.route.edges] == [(0, False), (1, False)]
 
 
 def test_a_plan_that_follows_no_road_is_passed_over() -> None:
     plan = degrees((5000.0, 5000.0), (5100.0, 5000.0))
     found = finder().find(pose(20.0, 0.0, EAST), pose(80.0, 0.0, EAST), planned_deg=plan)
-    assert [key_of(one) for one in found.route.edges] == [(0, False)]
+    assert [one.key for one in found.route.edges] == [(0, False)]
     assert found.planned_m == 0.0
 
 
 def test_a_goal_behind_on_the_same_road_is_come_to_by_driving_round() -> None:
     found = finder().find(pose(80.0, 0.0, EAST), pose(20.0, 0.0, EAST), planned_deg=None)
-    assert key_of(found.route.edges[0]) == key_of(found.route.edges[-1]) == (0, False)
+    assert found.route.edges[0].key == found.route.edges[-1].key == (0, False)
     assert len(found.route.edges) > 2
 
 
@@ -95,7 +95,7 @@ def test_who_can_only_turn_back_does_so() -> None:
     found = finder(graph_of(street)).find(
         pose(20.0, 0.0, EAST), pose(20.0, 2.0, WEST), planned_deg=None
     )
-    assert [key_of(one) for one in found.route.edges] == [(0, False), (0, True)]
+    assert [one.key for one in found.route.edges] == [(0, False), (0, True)]
 
 
 def test_the_way_keeps_to_turn_restrictions() -> None:
@@ -104,7 +104,7 @@ def test_the_way_keeps_to_turn_restrictions() -> None:
     first, left = free.edges
     no_left = TurnRule(1, first.edge.way_id, (), frozenset({left.edge.way_id}), False, False)
     kept = finder(TOWN, no_left).find(pose(20.0, 0.0, EAST), goal, planned_deg=None).route
-    assert key_of(kept.edges[-1]) == key_of(left)
+    assert kept.edges[-1].key == left.key
     assert kept.edges[-2].edge.name == "Row 0"
     assert kept.edges[-2].reverse
     assert not turns_back(kept)
@@ -113,8 +113,8 @@ def test_the_way_keeps_to_turn_restrictions() -> None:
 def test_a_goal_behind_the_car_on_the_plans_first_road_is_not_there_yet() -> None:
     plan = degrees((60.0, 0.0), (100.0, 0.0), (200.0, 0.0))
     found = finder().find(pose(60.0, 0.0, EAST), pose(20.0, 0.0, EAST), planned_deg=plan)
-    assert [key_of(one) for one in found.route.edges[:2]] == [(0, False), (1, False)]
-    assert key_of(found.route.edges[-1]) == (0, False)
+    assert [one.key for one in found.route.edges[:2]] == [(0, False), (1, False)]
+    assert found.route.edges[-1].key == (0, False)
     assert not turns_back(found.route)
 
 

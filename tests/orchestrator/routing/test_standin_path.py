@@ -106,7 +106,7 @@ def test_who_comes_out_of_the_side_street_halts_at_its_sign() -> None:
 def test_a_stop_sign_binds_the_driver_it_faces_alone() -> None:
     osm = town().osm
     _, route = by_the_sign()
-    away = Route(tuple(DirectedEdge(e.edge, not e.reverse) for e in reversed(route.edges)), 0.0)
+    away = Route(tuple(e.back for e in reversed(route.edges)), 0.0)
 
     assert (len(stop_signs(osm, route)), len(stop_signs(osm, away))) == (1, 0)
 
