@@ -148,7 +148,7 @@ def _ways(
     signs: SignsInside,
     driving_side: DrivingSide,
 ) -> list[ConnectionFacts]:
-    by_road: dict[EdgeKey, Approach] = {item.key: item for item in found}
+    by_road = {item.key: item for item in found}
     near = "right" if driving_side == "right" else "left"
     weight: Mapping[str, int] = {"straight": 0, near: 1, "u_turn": 3}
     plain = Standing(Rank.PLAIN, "near_side", "default")
@@ -169,9 +169,8 @@ def _ways(
     for c, heading, exit_heading, bend_rad, length_m in rows:
         toward = c.movement.toward
         mine = by_road.get(toward.key)
-        junction = c.cluster.junction
-        name = junction.summary.id if junction is not None else ""
-        kind = junction.summary.kind if junction is not None else "other"
+        summary = None if c.cluster.junction is None else c.cluster.junction.summary
+        name, kind = ("", "other") if summary is None else (summary.id, summary.kind)
         sign = next(iter(signs.get(c.id, ())), None)
         ways.append(
             ConnectionFacts(

@@ -39,7 +39,6 @@ class Chosen(NamedTuple):
 
     place: Place | None
     evidence: str
-    proven: bool
     question: OpenQuestion | None = None
 
 
@@ -65,7 +64,7 @@ def chosen_place(
     answered = {answers[key] for key in ("latitude", "x") if key in answers}
     wanted = [group for group in groups if not answered or answered & group]
     if not wanted:
-        return Chosen(None, f"no column {answered.pop()!r} that positions can be in", False)
+        return Chosen(None, f"no column {answered.pop()!r} that positions can be in")
     wanted.sort(key=best_of)
     group = wanted[0]
     # Another receiver's columns are another reading; the same ones with a stranger are none.
@@ -82,7 +81,7 @@ def chosen_place(
             names = sorted({place.fields[first] for place in places
                             if frozenset(place.fields.values()) in rivals})  # fmt: skip
             text = f"positions may lie in {' or in '.join(map(_listed, rivals))}: what is {first}?"
-            return Chosen(None, "", False, OpenQuestion(first, text, tuple(names)))
+            return Chosen(None, "", OpenQuestion(first, text, tuple(names)))
     rows = [
         (score, place)
         for score, place in zip(scores, places, strict=True)
@@ -105,18 +104,18 @@ def _order_of(
     rows = sorted(rows, key=lambda row: row[0])
     unit, question = _unit_of(rows, country_of=country_of, answers=answers)
     if question is not None:
-        return Chosen(None, "", False, question)
+        return Chosen(None, "", question)
     rows = [row for row in rows if row[1].unit == unit]
     if not rows:
-        return Chosen(None, f"positions cannot be in {unit!r}", False)
+        return Chosen(None, f"positions cannot be in {unit!r}")
     first = next(iter(rows[0][1].fields))
     if first in answers:
         for _, place in rows:
             if place.fields[first] == answers[first]:
-                return Chosen(place, f"{first} as answered", True)
-        return Chosen(None, f"{answers[first]} cannot be {first}", False)
+                return Chosen(place, f"{first} as answered")
+        return Chosen(None, f"{answers[first]} cannot be {first}")
     if len(rows) == 1:
-        return Chosen(rows[0][1], "the only order of these columns that is on Earth", True)
+        return Chosen(rows[0][1], "the only order of these columns that is on Earth")
     if rows[0][1].motion.sparse:
         # Ways that are too short by what bends cut off come near to some unit in either order.
         whatever = [(_by_any_speed(place, sensors), place) for _, place in rows]
@@ -128,22 +127,21 @@ def _order_of(
             rows[0][1],
             f"with {first} and the other turned round, what sensors say of speed and heading"
             f" fits {said}{' as badly' if np.isfinite(rows[1][0]) else ''}",
-            True,
         )
     if country_of is not None and rows[0][1].middle_deg is not None:
         on_land = [place for _, place in rows if _on_land(place, country_of)]
         if len(on_land) == 1:
-            return Chosen(on_land[0], "the other order lies in the sea, or nowhere", True)
+            return Chosen(on_land[0], "the other order lies in the sea, or nowhere")
     named = sorted(((called(place.fields), place) for _, place in rows), key=lambda row: -row[0])
     if named[0][0] > named[1][0]:
         said = "by names alone: nothing in the table proves the order of its columns"
-        return Chosen(named[0][1], said, False)
+        return Chosen(named[0][1], said)
     if rows[0][1].middle_deg is None:
         # The one question that a plane leaves is where it lies.
-        return Chosen(rows[0][1], "in this order by nothing but the columns' own", False)
+        return Chosen(rows[0][1], "in this order by nothing but the columns' own")
     names = tuple(dict.fromkeys(place.fields[first] for _, place in rows))
     text = f"positions lie in {', '.join(rows[0][1].fields.values())}: which of them is {first}?"
-    return Chosen(None, "", False, OpenQuestion(first, text, names))
+    return Chosen(None, "", OpenQuestion(first, text, names))
 
 
 def _unit_of(

@@ -254,7 +254,6 @@ class HeadingFit(NamedTuple):
     other_spread_rad: float
     """Were it growing the other way."""
     late_s: float
-    swings_rad: float
     reverse_s: float
     """So long the car drove backwards by it."""
 
@@ -294,6 +293,4 @@ def heading_of(motion: GridMotion, column: str, angle: Array, lates: Indices) ->
     swings = float(np.std(known)) if len(known) else 0.0
     if spread > 0.14 or spread > 0.4 * min(other, next_unit, swings):
         return None
-    return HeadingFit(
-        column, unit, sign < 0, offset, spread, other, late * GRID_S, swings, reverse_s
-    )
+    return HeadingFit(column, unit, sign < 0, offset, spread, other, late * GRID_S, reverse_s)

@@ -62,7 +62,7 @@ def test_a_heading_is_no_latitude_by_a_clock_that_is_a_thousand_times_slower(
 
 def reading(unit: str, frame: str) -> Reading:
     clock = ClockColumn("t", unit, "log", np.arange(3.0), False, "")
-    return Reading(clock, frame, Chosen(None, "", False, OpenQuestion("origin", "where?")), None)
+    return Reading(clock, frame, Chosen(None, "", OpenQuestion("origin", "where?")), None)
 
 
 def test_a_unit_of_time_that_nothing_tells_is_asked_for() -> None:
