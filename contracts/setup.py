@@ -245,6 +245,6 @@ class CopilotSetup(ProcessSetup, frozen=True, kw_only=True, forbid_unknown_field
     page_tls: TlsFiles | None = None
     """The certificate that the page is served with; without one only on the loopback interface."""
     awaited: bool = True
-    """Whether the drive has started it and waits for its token; not so another seat's."""
+    """Whether the drive has started it and waits for its token; another seat's says where it is."""
     frames_file: str | None = None
     """Where what the display showed is kept."""

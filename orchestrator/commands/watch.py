@@ -13,11 +13,10 @@ from foretwin.contracts.errors import UserError
 from foretwin.contracts.joining import RunningDrive, newest_running, running_drive
 from foretwin.contracts.local_bus import WATCH
 from foretwin.contracts.owned_folder import temporary_folder
-from foretwin.contracts.page_address import USUAL_PORT, page_address, page_key
+from foretwin.contracts.page_address import USUAL_PORT
 from foretwin.contracts.ports import LOOPBACK, LOOPBACKS, free_or, listen_place
 from foretwin.contracts.process_setup import BusSetup
 from foretwin.contracts.setup import CopilotSetup, ViewerSetup, read_setup, write_setup
-from foretwin.contracts.terminal import say
 from foretwin.orchestrator.campaign.joining import own_certificate
 from foretwin.orchestrator.drive.exit_words import EXIT_DONE
 from foretwin.orchestrator.record.run_state import RUNNING, read_record
@@ -52,10 +51,6 @@ def watch(request: WatchRequest) -> int:
         setup = watch_setup(drive, request, made)
         file = made / "watch.json"
         write_setup(setup, file)
-        key = page_key(setup.bus, setup.run_id)
-        secure = setup.page_tls is not None
-        address = page_address(key, host=setup.host, port=setup.port, secure=secure)
-        say(f"{drive.run_id}: co-pilot display: {address}")
         return _run("--setup", str(file))
 
 

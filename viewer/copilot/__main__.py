@@ -24,7 +24,7 @@ from foretwin.contracts.errors import UserError
 from foretwin.contracts.guard import Refused, is_identifier
 from foretwin.contracts.keys import alive_key, process_of_alive_key
 from foretwin.contracts.marks import MarkReply, MarkRequest
-from foretwin.contracts.page_address import USUAL_PORT, page_key
+from foretwin.contracts.page_address import USUAL_PORT, page_address, page_key
 from foretwin.contracts.process import ProcessLife, run_process
 from foretwin.contracts.setup import CopilotSetup
 from foretwin.contracts.terminal import say
@@ -212,6 +212,10 @@ def serve(setup: CopilotSetup, bus: Bus, life: ProcessLife) -> None:
     server.start()
     if setup.awaited:
         life.ready()
+    else:
+        secure = setup.page_tls is not None
+        address = page_address(key, host=setup.host, port=setup.port, secure=secure)
+        say(f"{setup.run_id}: co-pilot display: {address}")
     while not life.over:
         begun_s = time.monotonic()
         server.publish(display.turn(), begun_s)

@@ -64,7 +64,7 @@ class DisplayRun:
         self.start()
 
     def start(self) -> None:
-        """Start the display's process and wait until it is ready."""
+        """Start the display's process and wait until it is ready, if it tells the drive."""
         self.process = subprocess.Popen(
             [
                 sys.executable,
@@ -73,8 +73,12 @@ class DisplayRun:
                 "foretwin.viewer.copilot",
                 "--setup",
                 str(self.folder / "copilot.json"),
-            ]
+            ],
+            stdout=None if self.setup.awaited else subprocess.PIPE,
+            text=True,
         )
+        if not self.setup.awaited:
+            return
         item = self._alive.take(DEADLINE_S)
         while item is not None and not item.up:  # the one before it is gone
             item = self._alive.take(DEADLINE_S)
@@ -120,6 +124,8 @@ class DisplayRun:
         if self.process.poll() is None:
             self.process.kill()
             self.process.wait()
+        if self.process.stdout is not None:
+            self.process.stdout.close()
         self.bus.close()
 
 

@@ -75,6 +75,13 @@ def test_a_drive_is_on_the_page_and_what_was_shown_is_kept(start: Start) -> None
     assert kept.at(4.0).danger is not None
 
 
+def test_another_seat_says_where_it_is_once_it_can_be_opened(start: Start) -> None:
+    run = start(awaited=False)
+    assert run.process.stdout is not None
+    assert run.process.stdout.readline() == f"{RUN}: co-pilot display: {run.address}\n"
+    assert run.ask("GET", "about")[0] == 200
+
+
 def test_a_process_that_dies_is_on_the_page_and_comes_back(start: Start) -> None:
     run = start()
     with ZenohBus(run.setup.bus) as worker:
