@@ -33,6 +33,8 @@ MOST_BYTES = 32 * 2**20
 """Of one message: some fifty times the largest answer of a worker that was measured, 0.6 MB."""
 MOST_SAMPLE_BYTES = 2**20
 """Of what a vehicle sends or a process is told of it: 5,000 road users fit, twice."""
+MOST_ROS_BYTES = 4 * 2**20
+"""Of a message of ROS 2 that is no cloud: to read 2,000 objects takes a second."""
 MOST_TEXT = 20_000
 """Characters of one text: a line to tell, with room for a quoted input."""
 MOST_IDENTIFIER = 200

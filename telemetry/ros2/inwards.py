@@ -9,6 +9,7 @@ import msgspec
 
 from foretwin.contracts import drive
 from foretwin.contracts.anchor import Anchor
+from foretwin.contracts.bounds import MOST_BYTES, MOST_ROS_BYTES
 from foretwin.contracts.foreign_bus import Arrived
 from foretwin.contracts.frames import GeoPoint
 from foretwin.contracts.guard import Refused, admit
@@ -148,6 +149,10 @@ class Inwards:
             return []
         if arrived.attachment is not None:
             self._follow(row.topic, arrived.attachment)
+        most = MOST_BYTES if row.type == POINT_CLOUD2 else MOST_ROS_BYTES
+        if len(arrived.payload) > most:
+            self.unused[f"{row.topic}: more than {most} bytes"] += 1
+            return []
         try:
             ros = typestore().deserialize_cdr(arrived.payload, row.type)
         except Exception:  # whatever rosbags raises over broken bytes, or those of another type

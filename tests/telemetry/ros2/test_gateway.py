@@ -7,6 +7,7 @@ import math
 import pytest
 
 from foretwin.contracts.anchor import Anchor
+from foretwin.contracts.bounds import MOST_ROS_BYTES
 from foretwin.contracts.bus import Mailbox
 from foretwin.contracts.drive import GnssFix, RoadUser, RoadUsers, SteeringSample, VehicleState
 from foretwin.contracts.frames import GeoPoint
@@ -159,10 +160,12 @@ def test_what_cannot_be_used_is_counted_and_survived() -> None:
     ground.arrive("0/sensing/gnss/sensor_msgs::msg::dds_::Imu_/RIHS01_x", fix(5 * S, 52.0, 13.0))
     ground.arrive(STEERING_KEY + "x", fix(5 * S, 52.0, 13.0))
     ground.arrive("a/b", fix(5 * S, 52.0, 13.0))
+    ground.arrive(FIX_KEY, fix(5 * S, 52.0, 13.0).ljust(MOST_ROS_BYTES + 1))
     ground.arrive(FIX_KEY.replace("gnss", "other"), fix(5 * S, 52.0, 13.0))
     assert ground.inbox.take() is None
     assert ground.gateway.report()["unused"] == {
         "a/b: no key of rmw_zenoh": 1,
+        "/sensing/gnss: more than 4194304 bytes": 1,
         "/sensing/other: not mapped": 1,
         "/sensing/gnss: unreadable as sensor_msgs/msg/NavSatFix": 1,
         "/sensing/gnss: GnssFix: lat_deg not finite": 1,
