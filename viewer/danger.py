@@ -14,6 +14,9 @@ from foretwin.contracts.simulation import AMBER_FROM, GREEN_TO, RED_FROM, RoundV
 Level = Literal["none", "calm", "watch", "danger"]
 """How critical a round is; `none` where nothing is known."""
 LEVELS: tuple[Level, ...] = ("none", "calm", "watch", "danger")
+ROUND_FOR_S = 3.0
+"""So old a round may be that is shown, counted from the state that it began with; the slowest pace
+is one in two seconds."""
 FALLS_AFTER_ROUNDS = 2
 """A level rises at once; it falls when so many rounds in a row are below it, so that nobody looks
 at a band that flickers."""

@@ -20,7 +20,7 @@ from foretwin.contracts.simulation import (
     RoundView,
 )
 from foretwin.viewer.colours import CRITICAL, NOMINAL, ROAD_USER, SAFE, TWIN, WATCH, Colour
-from foretwin.viewer.danger import dangers_of, instant_of
+from foretwin.viewer.danger import ROUND_FOR_S, dangers_of, instant_of
 from foretwin.viewer.log_drive import PLAN
 from foretwin.viewer.rows import Row, document, in_markdown, place_text, point_at, raised, static
 
@@ -86,6 +86,30 @@ def rows_of_round(view: RoundView, drive_ns: int) -> list[Row]:
         return [*no_futures(drive_ns), Row("scenarios/table", drive_ns, document(text))]
     table = Row("scenarios/table", drive_ns, document(scenario_table(view)))
     return [*_futures(view, drive_ns), table]
+
+
+class RoundLog:
+    """Turns rounds into rows, and takes one away that is too old, as where rounds are missed."""
+
+    def __init__(self) -> None:
+        self._shown_ns: int | None = None
+
+    def rows(self, view: RoundView, drive_ns: int) -> list[Row]:
+        """Return the rows of a round."""
+        self._shown_ns = None if view.late else drive_ns
+        return rows_of_round(view, drive_ns)
+
+    def old(self, drive_ns: int) -> list[Row]:
+        """Return what takes the round away whose state is so long ago."""
+        if self._shown_ns is None or drive_ns - self._shown_ns <= ROUND_FOR_S * 1e9:
+            return []
+        text = Row("scenarios/table", drive_ns, document(f"no round for {ROUND_FOR_S:.0f} s"))
+        return [*self.none(drive_ns), text]
+
+    def none(self, drive_ns: int) -> list[Row]:
+        """Return what takes the round away."""
+        self._shown_ns = None
+        return no_futures(drive_ns)
 
 
 def no_futures(drive_ns: int) -> list[Row]:

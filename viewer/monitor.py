@@ -9,6 +9,7 @@ from typing import Any
 
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.codec import read_message
+from foretwin.contracts.drive import VehicleState
 from foretwin.contracts.frames import LocalFrame
 from foretwin.contracts.roads_shown import RoadsShown
 from foretwin.contracts.simulation import ActiveWorld, Event, WorldNotice
@@ -67,16 +68,17 @@ class Monitor:
         self._load_world, self._roads, self._lot = load_world, roads, lot
         self._drive = DriveLog(drive_frame)
         self._detected = RoadUsersLog(drive_frame, DETECTED_PATH, DETECTED)
+        self._round = log_scenarios.RoundLog()
         self._run = RunLog(title, attribution, clock)
         self._tuning = TuningLog()
         self._centres: dict[str, Array] = {}
         self._now_ns = 0
         self._handlers: dict[str, Callable[[Any, int], list[Row]]] = {
-            "state": lambda one, ns: [*self._drive.state(one, ns), *self._detected.old(ns)],
+            "state": self._state,
             "gnss": self._drive.gnss,
             "plan": self._drive.plan,
             "end": lambda end, ns: self._say("info", f"vehicle: {end.reason}", ns),
-            "round": log_scenarios.rows_of_round,
+            "round": self._round.rows,
             "comparison": log_scenarios.rows_of_comparison,
             "sibling": log_scenarios.rows_of_sibling,
             "plan_comparison": log_scenarios.rows_of_plan_comparison,
@@ -149,6 +151,10 @@ class Monitor:
         event = Event(stamp_ns=drive_ns, level=level, source="viewer", text=text)
         return rows_of_event(event, drive_ns)
 
+    def _state(self, state: VehicleState, drive_ns: int) -> list[Row]:
+        rows = self._drive.state(state, drive_ns)
+        return [*rows, *self._detected.old(drive_ns), *self._round.old(drive_ns)]
+
     def _world(self, notice: WorldNotice, drive_ns: int) -> list[Row]:
         return self._show_world(notice.world_id, drive_ns)
 
@@ -165,7 +171,7 @@ class Monitor:
     def _active_world(self, active: ActiveWorld, drive_ns: int) -> list[Row]:
         if active.world_id is None:
             self._drive.look_at(None)
-            return log_scenarios.no_futures(drive_ns)
+            return self._round.none(drive_ns)
         rows = self._show_world(active.world_id, drive_ns)
         self._drive.look_at(self._centres.get(active.world_id))
         return rows

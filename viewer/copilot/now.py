@@ -28,8 +28,8 @@ from foretwin.viewer.copilot.alerts import Alerts
 from foretwin.viewer.copilot.frame import AheadFrame, AlertFrame, DangerFrame, PageFrame, SeenFrame
 from foretwin.viewer.copilot.lights_now import LightsNow
 from foretwin.viewer.copilot.right_of_way import RightOfWay, of_junction, right_of_way
-from foretwin.viewer.copilot.round_now import OLD_ROUND_S, ROUND_FOR_S, RoundNow
-from foretwin.viewer.danger import Danger, instant_of
+from foretwin.viewer.copilot.round_now import OLD_ROUND_S, RoundNow
+from foretwin.viewer.danger import ROUND_FOR_S, Danger, instant_of
 
 MOST_SEEN = 60
 _OTHERS_SHOWN = 10

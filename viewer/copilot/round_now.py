@@ -4,11 +4,8 @@ from __future__ import annotations
 
 from foretwin.contracts.drive import VehicleState
 from foretwin.contracts.simulation import RoundView
-from foretwin.viewer.danger import Danger, Level, SteadyLevel, dangers_of
+from foretwin.viewer.danger import ROUND_FOR_S, Danger, Level, SteadyLevel, dangers_of
 
-ROUND_FOR_S = 3.0
-"""So old a round may be that is shown, counted from the state that it began with; the slowest pace
-is one in two seconds."""
 OLD_ROUND_S = 1.5
 """From so much on a round is said to be old: two of the usual pace are missing then."""
 

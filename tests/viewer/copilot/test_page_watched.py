@@ -23,7 +23,8 @@ from foretwin.contracts.ports import free_endpoint
 from foretwin.contracts.setup import BusSetup
 from foretwin.contracts.simulation import Event, RunEnd
 from foretwin.contracts.tuning import SetReply, SetRequest
-from foretwin.viewer.copilot.round_now import OLD_ROUND_S, ROUND_FOR_S
+from foretwin.viewer.copilot.round_now import OLD_ROUND_S
+from foretwin.viewer.danger import ROUND_FOR_S
 from tests.contracts.bus_sides import DEADLINE_S
 from tests.viewer import scene
 from tests.viewer.copilot.chromium import Browser, judges_python

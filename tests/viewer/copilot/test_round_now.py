@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from foretwin.contracts.simulation import ActiveWorld
-from foretwin.viewer.copilot.round_now import OLD_ROUND_S, ROUND_FOR_S
+from foretwin.viewer.copilot.round_now import OLD_ROUND_S
+from foretwin.viewer.danger import ROUND_FOR_S
 from tests.viewer.copilot.test_now import Drive, a_round
 from tests.viewer.scene import WORLD_ID, state_at
 
