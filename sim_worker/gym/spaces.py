@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 from pathlib import Path
 from typing import Any, TypeAlias, cast
 
@@ -36,5 +37,10 @@ def course_of(
     """
     if render_mode not in (None, "rgb_array"):
         raise UserError(f"render_mode {render_mode!r} is not rgb_array")
+    of_course = (*inspect.signature(Course.__init__).parameters,)
+    known = (*Source._fields[1:], *of_course[of_course.index("count") + 1 :])
+    for name in settings:
+        if name not in known:
+            raise UserError(f"unknown setting {name!r}; known: {', '.join(known)}")
     of_source = {name: settings.pop(name) for name in Source._fields if name in settings}
     return Course(Source(world, **of_source), count=count, **settings)
