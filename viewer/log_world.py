@@ -26,7 +26,8 @@ LANE_EDGE: Colour = (138, 143, 152)
 KERB: Colour = (112, 116, 124)
 OBSTACLE: Colour = (96, 116, 84)
 CONNECTION: Colour = (84, 118, 150)
-SIGNAL: Colour = (255, 196, 64)
+SIGNAL: Colour = (150, 154, 164)
+"""A head whose colour nobody tells."""
 BUILDING: dict[Provenance, Colour] = {
     "tagged": (168, 174, 186),
     "inferred": (146, 152, 164),
@@ -88,7 +89,8 @@ def rows_of_world(world: World, *, drive_frame: LocalFrame, drive_ns: int) -> li
     rows += flat("crossings", stripes, PAINT_HEIGHT_M, PAINT)
     rows += flat("islands", _polygons(world.islands), ISLAND_HEIGHT_M, ISLAND)
     if world.signals:
-        rows += _signal_rows(world, move, f"{base}/signals", drive_ns)
+        tops = signal_tops(world, drive_frame=drive_frame)
+        rows += _signal_rows(tops, f"{base}/signals", drive_ns)
     if world.buildings:
         mesh = prism_mesh(
             move.polygons(_polygons(world.buildings)),
@@ -178,10 +180,14 @@ def _lines(lines: Sequence[Array], colour: Colour, radius_m: float) -> rr.LineSt
     )
 
 
-def _signal_rows(world: World, move: _Mover, path: str, drive_ns: int) -> list[Row]:
-    heads = np.array([signal.position for signal in world.signals], dtype=np.float64)
-    tops = np.column_stack([move.lines([heads[:, :2]])[0], heads[:, 2]])
-    tops[:, 2] = np.where(tops[:, 2] > 0.5, tops[:, 2], SIGNAL_HEIGHT_M)
+def signal_tops(world: World, *, drive_frame: LocalFrame) -> Array:
+    """Return (N, 3) metres in `drive_frame` where the heads of a World's signals are shown."""
+    heads = np.array([signal.position for signal in world.signals], dtype=np.float64).reshape(-1, 3)
+    xy_m = target_from_source(drive_frame, world.frame, heads[:, :2], np.zeros(len(heads))).xy_m
+    return np.column_stack([xy_m, np.where(heads[:, 2] > 0.5, heads[:, 2], SIGNAL_HEIGHT_M)])
+
+
+def _signal_rows(tops: Array, path: str, drive_ns: int) -> list[Row]:
     feet = tops * [1.0, 1.0, 0.0]
     return [
         Row(path, drive_ns, rr.Points3D(tops, colors=[SIGNAL] * len(tops), radii=0.35), True),

@@ -19,6 +19,7 @@ from foretwin.viewer.colours import DETECTED, VIRTUAL
 from foretwin.viewer.legend import legend_rows
 from foretwin.viewer.log_camera_image import CameraImageLog
 from foretwin.viewer.log_drive import DriveLog
+from foretwin.viewer.log_lights import LightsLog
 from foretwin.viewer.log_lot import rows_of_injection
 from foretwin.viewer.log_point_cloud import PointCloudLog
 from foretwin.viewer.log_radar_list import rows_of_radar_list
@@ -69,6 +70,7 @@ class Monitor:
         self._drive = DriveLog(drive_frame)
         self._detected = RoadUsersLog(drive_frame, DETECTED_PATH, DETECTED)
         self._round = log_scenarios.RoundLog()
+        self._lights = LightsLog(drive_frame)
         self._run = RunLog(title, attribution, clock)
         self._tuning = TuningLog()
         self._centres: dict[str, Array] = {}
@@ -90,6 +92,7 @@ class Monitor:
             "objects": self._detected.rows,
             "injection": rows_of_injection,
             "point_cloud": PointCloudLog().rows,
+            "lights": self._lights.rows,
             "radar_list": rows_of_radar_list,
             "camera_image": CameraImageLog().rows,
             "active_world": self._active_world,
@@ -165,6 +168,7 @@ class Monitor:
             world = self._load_world(world_id)
         except (OSError, ValueError) as problem:
             return self._say("error", f"World {world_id} is not shown: {problem}", drive_ns)
+        self._lights.know(world)
         self._centres[world_id] = world_centre(world, drive_frame=self._frame)
         return rows_of_world(world, drive_frame=self._frame, drive_ns=drive_ns)
 
