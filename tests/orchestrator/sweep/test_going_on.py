@@ -19,7 +19,7 @@ from foretwin.orchestrator.record.ledger import JobsLedger
 from foretwin.orchestrator.sweep.spec import Loaded, load_spec
 from foretwin.orchestrator.sweep.workers import worker_setup
 from foretwin.world_gen.world_store import WorldStore
-from tests.orchestrator.sweeps import small_sweep
+from tests.orchestrator.sweeps import SMALL, small_sweep
 from tests.sim_worker.in_process_runner import InProcessRunner
 from tests.sim_worker.scenarios.worlds import tee
 
@@ -28,6 +28,8 @@ COVERS = (
     "foretwin.orchestrator.sweep.places",
     "foretwin.orchestrator.sweep.play",
 )
+SHORT = SMALL.replace("horizon_s = 5.0", "horizon_s = 1.0").replace("cases = 2", "cases = 1")
+"""Here it does not matter what happens in the futures, which are played again and again."""
 
 
 class Leaving(InProcessRunner):
@@ -56,7 +58,7 @@ def played(loaded: Loaded, out: Path, *left_out: str) -> dict[str, Any]:
 def two_worlds(tmp_path_factory: pytest.TempPathFactory) -> tuple[Loaded, Path, dict[str, Any]]:
     """A small sweep over two Worlds, its folder, and what it came to."""
     folder = tmp_path_factory.mktemp("two")
-    spec = small_sweep(folder)
+    spec = small_sweep(folder, SHORT)
     WorldStore(folder / "drawn").save(tee())
     loaded = load_spec(spec)
     return loaded, folder / "out", played(loaded, folder / "out")
