@@ -16,6 +16,8 @@ import pyarrow.parquet as pq
 import pytest
 
 from foretwin.contracts.bus import ZenohBus
+from foretwin.contracts.errors import UserError
+from foretwin.contracts.joining import newest_running
 from foretwin.contracts.ports import free_endpoint
 from foretwin.contracts.process_setup import BusSetup
 from foretwin.orchestrator.commands.cli import run
@@ -33,7 +35,7 @@ from tests.orchestrator.commands.test_standin import EXAMPLE
 from tests.orchestrator.lake.made_runs import made_run
 from tests.orchestrator.sweeps import small_sweep
 from tests.orchestrator.trip import town_world
-from tests.system.foretwin_command import environment, run_folder
+from tests.system.foretwin_command import environment, run_folder, wait_for
 from tests.telemetry.lot_car.test_braking import MAPPING
 
 COVERS = (
@@ -65,7 +67,7 @@ ASKED = {
     "gap": "{log}",
     "identify": "{log}",
     "intersections": f"{MAP_FILE}",
-    "judge": "{run} --vehicle city_bus --out {here}/judged",
+    "judge": "{here}/again --vehicle city_bus --out {here}/judged",
     "learn-progress": "--check {log}",
     "lights": "{here}/town.xodr",
     "map get": f"{BOX} --out {{here}}/got.osm --config {{here}}/overpass.toml",
@@ -103,18 +105,27 @@ class ShortDrive(NamedTuple):
     change_said: str
 
 
+def goes_on(out: Path) -> bool:
+    try:
+        return bool(newest_running(out))
+    except UserError:
+        return False
+
+
 @pytest.fixture(scope="module")
 def driven(tmp_path_factory: pytest.TempPathFactory) -> ShortDrive:
     folder = tmp_path_factory.mktemp("driven")
     out = folder / "runs"
     foretwin = [sys.executable, "-P", "-m", "foretwin"]
-    few = ["--futures", "8", "--workers", "1", "--tuning", "off", "--view", "none"]
-    words = ["drive", *few, "--speed", "max", "--end", "12", "--out", str(out), "--json"]
+    few = ["--futures", "2", "--workers", "1", "--tuning", "off", "--view", "none"]
+    words = ["drive", *few, "--speed", "max", "--end", "11", "--out", str(out), "--json"]
     around = environment(folder / "cache")
     with subprocess.Popen(
         [*foretwin, *words], env=around, text=True,
         stdout=subprocess.PIPE, stderr=subprocess.DEVNULL,
     ) as driving:  # fmt: skip
+        # A process for each look would take as long as the drive.
+        wait_for(lambda: goes_on(out), "a drive that goes on")
         change_said, until_s = "", time.monotonic() + DEADLINE_S
         while not change_said and time.monotonic() < until_s:
             change_said = subprocess.run(
@@ -142,11 +153,20 @@ def here(driven: ShortDrive, tmp_path: Path) -> dict[str, Any]:
     }
 
 
+def two_seconds_of(run: Path) -> None:
+    """Let a run be one that was told to end soon: to drive all of it again takes as long."""
+    record = json.loads((run / "run.json").read_text())
+    record["config"]["end_s"] = 2.0
+    (run / "run.json").write_text(json.dumps(record))
+
+
 @contextlib.contextmanager
 def prepared(typed: str, folder: Path) -> Iterator[None]:
     """What one command needs besides."""
     with contextlib.ExitStack() as open_until_asked:
         match typed.split():
+            case ["judge"]:
+                two_seconds_of(folder / "again")
             case ["declare"]:
                 table(folder)
             case ["merge"]:
