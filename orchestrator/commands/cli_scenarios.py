@@ -20,7 +20,7 @@ def list_scenarios(context: typer.Context) -> CommandResult | None:
     """List the scenarios that come with foretwin, or check and place scenarios."""
     if context.invoked_subcommand is not None:
         return None
-    from foretwin.orchestrator.commands.scenarios import list_scenarios as list_them
+    from foretwin.orchestrator.commands.scenario_catalogue import list_scenarios as list_them
 
     return list_them()
 
@@ -34,7 +34,7 @@ def check_scenario(
 
     Example: foretwin scenarios check SCENARIO.toml
     """
-    from foretwin.orchestrator.commands.scenarios import check_scenario_file
+    from foretwin.orchestrator.commands.scenario_catalogue import check_scenario_file
 
     return check_scenario_file(file)
 

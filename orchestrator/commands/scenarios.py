@@ -1,4 +1,4 @@
-"""The commands on scenarios: list the catalogue, check a file, place scenarios on a map."""
+"""`foretwin scenarios place`: where scenarios take place on a map, and why not elsewhere."""
 
 from __future__ import annotations
 
@@ -20,9 +20,8 @@ from foretwin.orchestrator.worlds.choice import choose_junctions
 from foretwin.sim_worker.futures.ego_dry_run import rehearsal_stage
 from foretwin.sim_worker.futures.playable import places
 from foretwin.sim_worker.futures.scene import SceneMaker
-from foretwin.sim_worker.scenarios.drawing import draw_cases
 from foretwin.sim_worker.scenarios.places import Unplaced
-from foretwin.sim_worker.scenarios.reading import catalogue, find_scenario, read_scenario
+from foretwin.sim_worker.scenarios.reading import catalogue, find_scenario
 from foretwin.sim_worker.vehicle.parameters import load_vehicle
 from foretwin.world_gen.build import build_world
 from foretwin.world_gen.junctions.intersections import Junction
@@ -63,30 +62,6 @@ class PlacesAsked(NamedTuple):
     junction_id: str | None = None
     at: str | None = None
     service_roads: bool = False
-
-
-def list_scenarios() -> CommandResult:
-    """Return the catalogue."""
-    found = list(catalogue().values())
-    return CommandResult(
-        [_described(scenario) for scenario in found], lambda: _print_catalogue(found)
-    )
-
-
-def _print_catalogue(found: Sequence[Scenario]) -> None:
-    from rich.table import Column
-
-    columns = (Column("id", no_wrap=True), "title", "cases", "where", "source")
-    rows = [(s.id, s.title, len(draw_cases(s)), _where(s), s.source) for s in found]
-    print_table("scenarios", columns, rows)
-
-
-def check_scenario_file(file: Path) -> CommandResult:
-    """Return what a scenario file holds; UserError, in one line, where it holds none."""
-    scenario = read_scenario(file)
-    found = _described(scenario)
-    words = f"{file}: {scenario.id}, {scenario.title}: {found['cases']} cases, {_where(scenario)}"
-    return CommandResult({"file": file, **found}, words)
 
 
 def place_scenarios(request: PlacesAsked) -> CommandResult:
@@ -187,28 +162,3 @@ def _print_table(map_file: Path, found: list[PlacedScenario]) -> None:
         "why not",
     )
     print_table(str(map_file), columns, rows)
-
-
-def _described(scenario: Scenario) -> dict[str, object]:
-    return {
-        "id": scenario.id,
-        "title": scenario.title,
-        "shows": scenario.shows,
-        "source": scenario.source,
-        "setting": scenario.where.setting,
-        "kinds": scenario.where.kinds,
-        "controls": scenario.where.controls,
-        "actors": [
-            {"name": a.name, "kind": a.kind, "relation": a.relation, "conduct": a.conduct}
-            for a in scenario.actors
-        ],
-        "cases": len(draw_cases(scenario)),
-        "horizon_s": scenario.horizon_s,
-    }
-
-
-def _where(scenario: Scenario) -> str:
-    where = scenario.where
-    if where.setting != "junction":
-        return where.setting.replace("_", " ")
-    return ", ".join((*where.kinds, *where.controls)) or "any junction"

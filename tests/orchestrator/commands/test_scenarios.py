@@ -18,6 +18,7 @@ COVERS = (
     "foretwin.orchestrator.commands.cli_options",
     "foretwin.orchestrator.commands.cli_scenarios",
     "foretwin.orchestrator.commands.output",
+    "foretwin.orchestrator.commands.scenario_catalogue",
     "foretwin.orchestrator.commands.scenario_export",
 )
 
