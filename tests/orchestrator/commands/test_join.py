@@ -73,9 +73,11 @@ def test_what_cannot_be_used_is_one_line(
     tmp_path: Path,
     capsys: pytest.CaptureFixture[str],
     lot: str,
+    monkeypatch: pytest.MonkeyPatch,
     words: tuple[str, ...],
     text: str,
 ) -> None:
+    monkeypatch.setattr("foretwin.contracts.zenoh_config.CONNECT_S", 0.3)
     given = ("second", "--anchor", lot, "--out", str(tmp_path), *words)
     assert text in said(capsys, *given)
 

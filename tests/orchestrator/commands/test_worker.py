@@ -48,8 +48,13 @@ def said(capsys: pytest.CaptureFixture[str], *words: str) -> str:
     ],
 )
 def test_what_cannot_be_used_is_one_line(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], words: tuple[str, ...], text: str
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+    words: tuple[str, ...],
+    text: str,
 ) -> None:
+    monkeypatch.setattr("foretwin.contracts.zenoh_config.CONNECT_S", 0.3)
     cache = () if "--cache" in words else ("--cache", str(tmp_path))
     assert said(capsys, "--connect", *words, *cache).startswith(f"foretwin: {text}")
 

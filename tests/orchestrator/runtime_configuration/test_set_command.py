@@ -97,8 +97,9 @@ def test_a_record_without_an_endpoint_is_named(tmp_path: Path) -> None:
 
 
 def test_a_drive_over_a_network_wants_its_operator(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    monkeypatch.setattr("foretwin.contracts.zenoh_config.CONNECT_S", 0.3)
     where = f"tls/localhost:{free_port()}"
     _run(tmp_path / "runs", "20261121-100000-aaaa", "running", where)
     asked = ["set", "role.ego=twin", "--out", str(tmp_path / "runs")]
