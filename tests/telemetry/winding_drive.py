@@ -87,6 +87,7 @@ def driven(
     steering: Told | None = None,
     forces: Told | None = truly,
     right_from_s: float = math.inf,
+    end_s: float = TICKS * TICK_S,
     fix_std_m: float = 0.02,
     fix_every: int = 5,
     way: Way = WINDING,
@@ -101,7 +102,7 @@ def driven(
     stays = math.exp(-fix_every * TICK_S / 30.0) if fix_std_m >= 0.5 else 0.0
     told = {"gyro": gyro, "wheels": wheels, "heading": heading, "steering": steering}
     sensors = told | {"forces": forces}
-    for tick, (_, _, _, x, y) in enumerate(way):
+    for tick, (_, _, _, x, y) in enumerate(way[: round(end_s / TICK_S)]):
         time_s = tick * TICK_S
         if time_s >= right_from_s:
             sensors = {name: one and truly for name, one in sensors.items()}
