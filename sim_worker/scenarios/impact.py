@@ -252,7 +252,7 @@ def first_touch(
     first = hit[rows].argmax(axis=1)
     late = ticks[first]
     early = np.where(first > 0, ticks[np.maximum(first - 1, 0)], 0.0)
-    for _ in range(_BISECTIONS):
+    for _ in range(_BISECTIONS if len(rows) else 0):
         middle = (early + late) / 2.0
         inside = touching(middle[:, None], rows)[:, 0]
         early, late = np.where(inside, early, middle), np.where(inside, middle, late)
