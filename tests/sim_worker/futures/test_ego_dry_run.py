@@ -22,7 +22,7 @@ from foretwin.sim_worker.futures.ego_dry_run import (
     staged_cases,
 )
 from foretwin.sim_worker.futures.future_rows import future_rows
-from foretwin.sim_worker.futures.playable import job_at, places
+from foretwin.sim_worker.futures.playable import job_at
 from foretwin.sim_worker.futures.result_digest import result_digest
 from foretwin.sim_worker.futures.run_job import run_job
 from foretwin.sim_worker.futures.scene import SceneMaker
@@ -30,7 +30,7 @@ from foretwin.sim_worker.scenarios.reading import catalogue
 from foretwin.sim_worker.scenarios.roles import StagedCase
 from foretwin.sim_worker.vehicle.parameters import load_vehicle
 from tests.sim_worker.scenarios.test_real_junctions import SMALL, worlds_of
-from tests.sim_worker.scenarios.worlds import cross, motorway, race_track, ring
+from tests.sim_worker.scenarios.worlds import cross, motorway, places, race_track, ring
 
 COVERS = (
     "foretwin.sim_worker.futures.driven_touch",
@@ -71,7 +71,7 @@ def play(world: World, scenario_id: str, planner: str = "constant_speed") -> Pla
     _WORLDS[world.id] = world
     stage, maker = _stage(world.id)
     scenario = catalogue()[scenario_id]
-    found = places(scenario, world, vehicle=CAR, most=1)
+    found = places(scenario, world, most=1)
     if not found.places:
         return None
     cases = [case for case in found.cases[0] if isinstance(case, StagedCase)]
@@ -147,7 +147,7 @@ def test_a_driven_line_begins_where_its_case_does() -> None:
     """Chords behind the start are shorter than the bend that they follow."""
     angle = np.linspace(0.0, 3.0, 200)
     bend = 15.0 * np.column_stack([np.sin(angle), 1.0 - np.cos(angle)])
-    case = places(catalogue()["scp"], cross(), vehicle=CAR, most=1).cases[0][0]
+    case = places(catalogue()["scp"], cross(), most=1).cases[0][0]
     assert isinstance(case, StagedCase)
     way = case.place.ego._replace(xy_m=bend, path=FrenetPath(bend))
     begun = case._replace(place=case.place._replace(ego=way), ego_arc_m=30.0)

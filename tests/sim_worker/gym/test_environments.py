@@ -34,6 +34,11 @@ def roundabout(**settings: Any) -> JunctionEnv:
     return JunctionEnv(ring(), cases=8, horizon_s=9.0, **settings)
 
 
+@functools.cache
+def to_refuse() -> JunctionEnv:
+    return JunctionEnv(ring(), cases=4)
+
+
 def vector(**settings: Any) -> JunctionVectorEnv:
     return JunctionVectorEnv(ROWS, ring(), cases=8, horizon_s=9.0, **settings)
 
@@ -249,9 +254,8 @@ def test_options_choose_the_scenario_its_values_and_the_case() -> None:
     ],
 )
 def test_options_that_do_not_fit_say_so(options: dict[str, Any], says: str) -> None:
-    env = JunctionEnv(ring(), cases=4)
     with pytest.raises(UserError, match=says):
-        env.reset(options=options)
+        to_refuse().reset(options=options)
 
 
 def test_a_setting_that_nobody_knows_is_named() -> None:

@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 from foretwin.contracts.world import World
+from foretwin.sim_worker.futures.ego_dry_run import rehearsal_stage
 from foretwin.sim_worker.futures.playable import places
 from foretwin.sim_worker.futures.scene import SceneMaker
 from foretwin.sim_worker.scenarios.casting import StagedCase, cast
@@ -50,8 +51,9 @@ def count(
 ) -> None:
     """Place the whole catalogue on a World's junction; `check` plays its cases as well."""
     vehicle, scenes = load_vehicle(), SceneMaker(world)
+    stage = rehearsal_stage(vehicle)
     for id_, scenario in catalogue().items():
-        result = places(scenario, world, scenes=scenes, vehicle=vehicle, most=1)
+        result = places(scenario, world, scenes=scenes, stage=stage, most=1)
         counts[id_]["placed"] += len(result.places)
         for unplaced in result.unplaced:
             counts[id_]["unplaced" if unplaced.applies else "elsewhere"] += 1

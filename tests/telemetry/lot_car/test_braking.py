@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 
 import numpy as np
@@ -196,12 +197,19 @@ def straight(way_m: float, *, at: AnchorPose = ANCHOR.lot) -> DrivenPath:
     )  # fmt: skip
 
 
+@functools.cache
+def before_a_pedestrian(dialect: str, objects: str, *, scale: float = 1.0) -> Meeting:
+    """A meeting after ten seconds, to be looked at alone."""
+    meeting = Meeting(dialect, objects, ahead_m=25.0, scale=scale)
+    meeting.go_on(10.0)
+    return meeting
+
+
 @pytest.mark.parametrize(
     ("dialect", "objects"), [("ros2dds", "PredictedObjects"), ("rmw_zenoh", "DetectedObjects")]
 )
 def test_on_an_empty_lot_it_stands_before_a_pedestrian_of_the_world(dialect: str, objects: str):
-    meeting = Meeting(dialect, objects, ahead_m=25.0)
-    meeting.go_on(10.0)
+    meeting = before_a_pedestrian(dialect, objects)
     assert meeting.gateway.gate.state == "open", meeting.gateway.gate.why
     report = meeting.car.report()
     assert report.brakes == ("pedestrian",)
@@ -217,11 +225,9 @@ def test_on_an_empty_lot_it_stands_before_a_pedestrian_of_the_world(dialect: str
 
 
 def test_a_car_of_1_10_stands_a_tenth_as_far_before_whom_it_hears_of() -> None:
-    large, small = (
-        Meeting("ros2dds", "PredictedObjects", ahead_m=25.0, scale=one) for one in (1.0, 10.0)
-    )
+    large = before_a_pedestrian("ros2dds", "PredictedObjects")
+    small = before_a_pedestrian("ros2dds", "PredictedObjects", scale=10.0)
     for one in (large, small):
-        one.go_on(10.0)
         assert one.gateway.gate.state == "open", one.gateway.gate.why
     reports = [one.car.report() for one in (large, small)]
     assert [one.brakes for one in reports] == [("pedestrian",)] * 2
