@@ -25,7 +25,7 @@ COVERS = (
 
 
 def drive_columns() -> dict[str, Array]:
-    drive = drawn_drive()
+    drive = drawn_drive(end_s=75.0)
     gnss, speed = drive["gnss"], drive["speed"]
     return {
         "t": gnss.stamps_ns / 1e9,
