@@ -30,6 +30,7 @@ from tests.sim_worker.analysis.gap.real_drives import accused_in
 from tests.sim_worker.driving import altered
 from tests.sim_worker.faulty_standin import (
     CAR_FAULTS,
+    DURATION_S,
     MODEL_FAULTS,
     Exit,
     drive_of,
@@ -55,9 +56,11 @@ FOUND = (
 )
 
 
-def judged_as(change: Exit, *, gnss_ends_ns: float = math.inf) -> tuple[list[Verdict], str]:
+def judged_as(
+    change: Exit, *, gnss_ends_ns: float = math.inf, end_s: float = END_S
+) -> tuple[list[Verdict], str]:
     """Return what is said of a sound car whose samples leave it changed, and what stays open."""
-    drive = drive_of(SEED).with_fault(change)
+    drive = drive_of(SEED, end_s=end_s).with_fault(change)
     kept = [one for one in drive.samples if one[0] != "gnss" or one[1].stamp_ns <= gnss_ends_ns]
     detector = FaultDetector(drive.info, model_with(None), frame=FRAME)
     return list(verdicts_on(detector, drive._replace(samples=kept))), detector.undecided
@@ -101,7 +104,7 @@ def test_a_speed_in_another_unit_is_the_sensors_and_no_pedals(gain: float, unit:
 
 def test_a_speed_known_to_be_wrong_accuses_nobody_else_where_positions_end() -> None:
     """All that is compared with it looks wrong: pedals, steering, the model's tyres."""
-    ends_ns = drive_of(SEED).info.start_stamp_ns + 6_000_000_000
+    ends_ns = drive_of(SEED, end_s=END_S).info.start_stamp_ns + 6_000_000_000
     told, undecided = judged_as(speed_as(lambda speed_mps: 1.6 * speed_mps), gnss_ends_ns=ends_ns)
     assert [one.cause for one in told] == ["speed_sensor"]
     assert undecided == ""
@@ -112,11 +115,13 @@ def test_a_speed_that_is_stuck_accuses_no_pedals_whenever_the_car_drives_as_fast
     assert {one.cause for one in told} == {"speed_sensor"}
 
 
-def test_clocks_apart_accuse_nobody_or_are_named() -> None:
+@pytest.mark.parametrize("end_s", [END_S, pytest.param(DURATION_S, marks=pytest.mark.judge)])
+def test_clocks_apart_accuse_nobody_or_are_named(end_s: float) -> None:
     """By 0.2 s of speeds or positions; a gyro that is stamped early is a model that lags."""
     for kind, late_s in ((SpeedSample, 0.2), (GnssFix, -0.2), (ImuSample, -0.1)):
         late_ns = round(1e9 * late_s)
-        told, _ = judged_as(said_as(kind, lambda m, ns=late_ns: {"stamp_ns": m.stamp_ns + ns}))
+        change = said_as(kind, lambda m, ns=late_ns: {"stamp_ns": m.stamp_ns + ns})
+        told, _ = judged_as(change, end_s=end_s)
         assert len(told) == (kind is ImuSample)
         assert all("stamped by clocks" in one.text for one in told)
 
