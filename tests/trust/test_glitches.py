@@ -34,7 +34,10 @@ class Glitched(NamedTuple):
 
 
 def with_glitches(log: Log, truth: Truth, planted: list[Glitch]) -> Glitched:
-    samples = glitched(log.samples(), planted, seed=6)
+    """Let a car hear a log until the last of its glitches is over."""
+    heard = list(log.samples())
+    end_ns = heard[0][1].stamp_ns + round(1e9 * (planted[-1].begin_s + SPACING_S))
+    samples = glitched([one for one in heard if one[1].stamp_ns < end_ns], planted, seed=6)
     states = states_of(Log(info=log.info, read=lambda _skipped: iter(samples)), truth.frame)
     return Glitched(consistency_of(states, truth), planted, states.skipped)
 
@@ -60,7 +63,10 @@ def test_a_car_with_wheels_and_gyro_is_not_misled(seed: int) -> None:
 
 
 @pytest.mark.real_data
-@pytest.mark.parametrize(("name", "count"), [("boreas", 100), ("potsdamer-platz-odometry", 28)])
+@pytest.mark.parametrize(("name", "count"), [
+    ("boreas", 30), pytest.param("boreas", 100, marks=pytest.mark.judge),
+    ("potsdamer-platz-odometry", 28),
+])  # fmt: skip
 def test_a_real_car_with_wheels_and_a_heading_is_not_misled(
     data_dir: Path, name: str, count: int
 ) -> None:
@@ -73,17 +79,20 @@ def test_a_real_car_with_wheels_and_a_heading_is_not_misled(
 
 
 @pytest.mark.real_data
-def test_positions_alone_survive_all_but_noise_that_nothing_tells_of(data_dir: Path) -> None:
+@pytest.mark.parametrize("count", [50, pytest.param(100, marks=pytest.mark.judge)])
+def test_positions_alone_survive_all_but_noise_that_nothing_tells_of(
+    data_dir: Path, count: int
+) -> None:
     """Two metres of noise from one fix to the next that are stated as centimetres hide the motion.
 
     So those may mislead while they last; what all others do to a car is next to nothing.
     """
     drive = next(d for d in given_drives(data_dir) if d.name == "boreas-positions")
-    run = with_glitches(drive.log(), truth_of(drive), glitches(100, from_s=20.0, seed=5))
+    run = with_glitches(drive.log(), truth_of(drive), glitches(count, from_s=20.0, seed=5))
     misled = Counter(
         run.during(at_s).kind for at_s in (*run.found.false_standstills_s, *run.found.yaw_losses_s)
     )
-    assert sum(misled[kind] for kind in ALONE_KINDS) <= 4
+    assert sum(misled[kind] for kind in ALONE_KINDS) <= 0.04 * count
     for at_s in run.found.yaw_losses_s:
         glitch = run.during(at_s)
         assert at_s < min(glitch.end_s, glitch.begin_s + SPACING_S) + 3.0

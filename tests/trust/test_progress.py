@@ -15,7 +15,7 @@ from tests.trust.progress import LEARNT_FROM, RANKS, DriveForecasts, pooled, row
 
 @cache
 def scores() -> tuple[DriveScore, ...]:
-    drive = town_examples(seed=4, minutes=6.0)
+    drive = town_examples(seed=4, minutes=3.0)
     return tuple(score(progress_model(), drive, blind=blind) for blind in (True, False))
 
 
@@ -42,7 +42,7 @@ def test_what_was_learnt_from_is_not_pooled() -> None:
 
 def test_what_really_came_is_what_is_scored() -> None:
     """A car that measures its speed right, beside one whose truth is a tenth farther."""
-    drive = town_examples(seed=4, minutes=6.0)
+    drive = town_examples(seed=4, minutes=3.0)
     right, _ = scores()
     farther = score(progress_model(), drive, blind=True, truth_m=1.1 * drive.distance_m)
     moved = drive.distance_m[drive.speed_mps >= 0.5]
