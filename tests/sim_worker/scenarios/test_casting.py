@@ -70,7 +70,7 @@ def test_the_planned_impact_happens_at_its_point(id_: str) -> None:
                 assert math.isnan(case.impact_time_s)
 
 
-@settings(max_examples=50)
+@settings(max_examples=25)
 @given(
     bearings=st.tuples(st.integers(0, 10), st.integers(60, 120), st.integers(150, 210),
                        st.integers(240, 300)),
