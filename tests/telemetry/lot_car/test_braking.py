@@ -198,10 +198,10 @@ def straight(way_m: float, *, at: AnchorPose = ANCHOR.lot) -> DrivenPath:
 
 
 @functools.cache
-def before_a_pedestrian(dialect: str, objects: str, *, scale: float = 1.0) -> Meeting:
-    """A meeting after ten seconds, to be looked at alone."""
+def before_a_pedestrian(dialect: str, objects: str, scale: float) -> Meeting:
     meeting = Meeting(dialect, objects, ahead_m=25.0, scale=scale)
     meeting.go_on(10.0)
+    assert meeting.gateway.gate.state == "open", meeting.gateway.gate.why
     return meeting
 
 
@@ -209,8 +209,7 @@ def before_a_pedestrian(dialect: str, objects: str, *, scale: float = 1.0) -> Me
     ("dialect", "objects"), [("ros2dds", "PredictedObjects"), ("rmw_zenoh", "DetectedObjects")]
 )
 def test_on_an_empty_lot_it_stands_before_a_pedestrian_of_the_world(dialect: str, objects: str):
-    meeting = before_a_pedestrian(dialect, objects)
-    assert meeting.gateway.gate.state == "open", meeting.gateway.gate.why
+    meeting = before_a_pedestrian(dialect, objects, 1.0)
     report = meeting.car.report()
     assert report.brakes == ("pedestrian",)
     assert report.lists > 90
@@ -225,10 +224,7 @@ def test_on_an_empty_lot_it_stands_before_a_pedestrian_of_the_world(dialect: str
 
 
 def test_a_car_of_1_10_stands_a_tenth_as_far_before_whom_it_hears_of() -> None:
-    large = before_a_pedestrian("ros2dds", "PredictedObjects")
-    small = before_a_pedestrian("ros2dds", "PredictedObjects", scale=10.0)
-    for one in (large, small):
-        assert one.gateway.gate.state == "open", one.gateway.gate.why
+    large, small = (before_a_pedestrian("ros2dds", "PredictedObjects", k) for k in (1.0, 10.0))
     reports = [one.car.report() for one in (large, small)]
     assert [one.brakes for one in reports] == [("pedestrian",)] * 2
     for name in ("stood_before_m", "braked_at_m", "driven_m"):
@@ -301,5 +297,4 @@ def test_a_plan_is_said_where_map_is_placed_alone():
     text = MAPPING.format(dialect="ros2dds", objects="PredictedObjects", lat=52.5, lon=13.4)
     mapping = parse_mapping(text, name="m.toml")
     assert "plan" in RosVoice(mapping, steering_ratio=15.3).channels
-    nowhere = replace(mapping, map_place=None)
-    assert "plan" not in RosVoice(nowhere, steering_ratio=15.3).channels
+    assert "plan" not in RosVoice(replace(mapping, map_place=None), steering_ratio=15.3).channels
