@@ -21,7 +21,8 @@ def classes() -> dict[str, list[str]]:
     for path in sorted(set(tracked_files())):
         name = str(path.relative_to(ROOT))
         if path.suffix == ".py" and not name.startswith("tests/"):
-            for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            text = path.read_text(encoding="utf-8")
+            for node in ast.walk(ast.parse(text)) if "class " in text else ():
                 if isinstance(node, ast.ClassDef):
                     found[node.name].append(name)
     return found
