@@ -8,6 +8,8 @@ what it names through its imports, or start the program as a whole (`tests/syste
 from __future__ import annotations
 
 import ast
+import re
+from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
 
@@ -115,14 +117,22 @@ def reached(test: str) -> set[str]:
 
 
 @cache
-def _imports(name: str) -> list[str]:
+def _file_of(name: str) -> Path | None:
     path = modules().get(name)
     if path is None and name.startswith("tests."):
         path = ROOT / Path(*name.split(".")).with_suffix(".py")
-    if path is None or not path.is_file():
+    return path if path is not None and path.is_file() else None
+
+
+@cache
+def _imports(name: str) -> list[str]:
+    """Return the modules of the program and of the tests that one imports or names in a string."""
+    path = _file_of(name)
+    if path is None:
         return []
-    found = []
-    for node in ast.walk(_tree(path)):
+    text, found = path.read_text(encoding="utf-8"), []
+    names_any = re.search(r"[\"']foretwin\.", text)
+    for node in ast.walk(ast.parse(text)) if names_any else _statements(ast.parse(text)):
         if isinstance(node, ast.Import):
             found += [alias.name for alias in node.names]
         elif isinstance(node, ast.ImportFrom) and node.module:
@@ -133,4 +143,12 @@ def _imports(name: str) -> list[str]:
             and node.value.startswith("foretwin.")
         ):
             found.append(node.value.replace(":", "."))
-    return found
+    return [name for name in dict.fromkeys(found) if _file_of(name)]
+
+
+def _statements(node: ast.AST) -> Iterator[ast.AST]:
+    """Yield the statements below a node, whatever they stand in; no expressions, which are many."""
+    for part in ("body", "orelse", "finalbody", "handlers", "cases"):
+        for one in getattr(node, part, ()):
+            yield one
+            yield from _statements(one)
