@@ -4,6 +4,7 @@ rule knows one side alone, or what a mapper did and no driver sees."""
 
 from __future__ import annotations
 
+import functools
 import math
 from pathlib import Path
 
@@ -97,13 +98,19 @@ def _rows(
 
 
 def _differences(
-    osm: OsmMap, other: OsmMap, *, mirrored: bool, every: int = 1, within_m: float = math.inf
+    osm: OsmMap,
+    worlds: list[World],
+    other: OsmMap,
+    *,
+    mirrored: bool,
+    every: int = 1,
+    within_m: float = math.inf,
 ) -> list[str]:
     """Return what lies elsewhere in the Worlds of another map, and where, near their middles."""
     found = []
     about_deg = osm.frame.origin.lon_deg if mirrored else None
     left_out = BY_SIDE if mirrored else BY_ID
-    pairs = zip(_worlds(osm, every), _worlds(other, every), strict=True)
+    pairs = zip(worlds, _worlds(other, every), strict=True)
     for before, after in pairs:
         mine = _rows(before, before.frame, None, left_out)
         its = _rows(after, before.frame, about_deg, left_out)
@@ -126,9 +133,10 @@ def _differences(
 
 def _checked(osm: OsmMap, every: int = 1) -> None:
     side = OTHER[build_road_graph(osm).driving_side]
-    assert not _differences(osm, mirrored_map(osm, side), mirrored=True, every=every)
-    assert not _differences(osm, reversed_map(osm), mirrored=False, every=every)
-    assert not _differences(osm, renumbered_map(osm, 2), mirrored=False, every=every)
+    differences = functools.partial(_differences, osm, _worlds(osm, every), every=every)
+    assert not differences(mirrored_map(osm, side), mirrored=True)
+    assert not differences(reversed_map(osm), mirrored=False)
+    assert not differences(renumbered_map(osm, 2), mirrored=False)
 
 
 @pytest.fixture(scope="module")
@@ -141,12 +149,13 @@ def drawn(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_drawn_junctions_are_built_alike_from_either_side(drawn: Path) -> None:
     for path in sorted(drawn.glob("*.osm")):
         osm = read_map(path)
+        worlds = _worlds(osm, 1)
         for other, mirrored in (
             (mirrored_map(osm, OTHER[build_road_graph(osm).driving_side]), True),
             (reversed_map(osm), False),
             (renumbered_map(osm, 1), False),
         ):
-            assert not _differences(osm, other, mirrored=mirrored), (path.name, mirrored)
+            assert not _differences(osm, worlds, other, mirrored=mirrored), (path.name, mirrored)
 
 
 def test_lanes_run_on_where_a_cycle_lane_begins_on_either_side(tmp_path: Path) -> None:
@@ -179,13 +188,19 @@ def test_real_junctions_are_built_alike_from_either_side(name: str, data_dir: Pa
     _checked(read_map(data_dir / MAPS[name]), every=4)
 
 
+@functools.lru_cache(1)
+def _every_second(file: Path) -> tuple[OsmMap, list[World]]:
+    osm = read_map(file)
+    return osm, _worlds(osm, 2)
+
+
 @pytest.mark.real_data
 @pytest.mark.parametrize("share", [0.0, 0.5, 1.0])
 @pytest.mark.parametrize("name", ["kingsway", "leeds", "berlin-mitte"])
 def test_where_ways_are_parted_moves_nothing(name: str, share: float, data_dir: Path) -> None:
-    osm = read_map(data_dir / MAPS[name])
+    osm, worlds = _every_second(data_dir / MAPS[name])
     parted = split_map(osm, share)
     assert len(parted.ways) > 1.15 * len(osm.ways)
     # The World ends elsewhere, and a road has as many more lanes as it has ways more.
-    found = _differences(osm, parted, mirrored=False, every=2, within_m=50.0)
+    found = _differences(osm, worlds, parted, mirrored=False, every=2, within_m=50.0)
     assert [line for line in found if "lanes" not in line] == []
