@@ -69,22 +69,31 @@ def slow_s(pace: float) -> float:
 
 @contextmanager
 def started(
-    out: Path, *arguments: str, entry: tuple[str, str] | None = None, pace: float = 1.0
+    out: Path,
+    *arguments: str,
+    entry: tuple[str, str] | None = None,
+    pace: float = 1.0,
+    changed_by: str = "",
 ) -> Iterator[subprocess.Popen[str] | WarmCommand]:
     """Start `foretwin drive`; whatever happens, it and its processes are gone afterwards.
 
     `entry` is what a fresh interpreter is given to run; None for a fork of one that has imported
-    all, which knows no `pace` but 1. One worker and no tuning unless they are asked for.
+    all, which knows no `pace` but 1 and first runs the program `changed_by`. One worker and no
+    tuning unless they are asked for.
     """
     for option, value in (("--tuning", "off"), ("--workers", "1")):
         if option not in arguments:
             arguments = (*arguments, option, value)
     words = ["drive", "--view", "none", "--out", str(out), *arguments]
     cwd, env = out.parent, environment(out.parent / "cache", pace=pace)
-    process = WarmCommand(words, cwd=cwd, env=env) if entry is None else subprocess.Popen(
-        [sys.executable, "-P", *entry, *words], cwd=cwd, env=env, text=True,
-        stdout=subprocess.PIPE, stderr=subprocess.STDOUT, stdin=subprocess.DEVNULL,
-    )  # fmt: skip
+    process: subprocess.Popen[str] | WarmCommand
+    if entry is None:
+        process = WarmCommand(words, cwd=cwd, env=env, changed_by=changed_by)
+    else:
+        process = subprocess.Popen(
+            [sys.executable, "-P", *entry, *words], cwd=cwd, env=env, text=True,
+            stdout=subprocess.PIPE, stderr=subprocess.STDOUT, stdin=subprocess.DEVNULL,
+        )  # fmt: skip
     try:
         yield process
     finally:

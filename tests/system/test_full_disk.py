@@ -12,7 +12,6 @@ SMALL = ("--speed", "max", "--futures", "12", "--end", "8")
 FULL_WHILE_THERE = """
 import errno, os, sys
 from pathlib import Path
-from foretwin.__main__ import main
 
 pwrite = os.pwrite
 
@@ -22,9 +21,8 @@ def take(*what):
     return pwrite(*what)
 
 os.pwrite = take
-main()
 """
-"""A drive whose disk takes no results as long as there is a file named `full`."""
+"""Makes a drive's disk take no results as long as there is a file named `full`."""
 
 pytestmark = pytest.mark.timeout(600)
 
@@ -33,7 +31,7 @@ def drive(folder: Path, *, to_the_end: bool) -> Finished:
     """Drive with a full disk, to the end or until the drive has told of it."""
     out, full = folder / "runs", folder / "full"
     full.touch()
-    with started(out, *SMALL, entry=("-c", FULL_WHILE_THERE)) as process:
+    with started(out, *SMALL, changed_by=FULL_WHILE_THERE) as process:
         if not to_the_end:
             wait_for(lambda: run_folder(out) is not None, "the run's folder")
             run = run_folder(out)

@@ -14,7 +14,7 @@ from foretwin.orchestrator.commands.cli import EXIT_USER, run
 from tests.system.foretwin_command import Finished, run_folder, started, wait_for
 
 HELD_AT_JOIN = """
-import sys, time
+import time
 from pathlib import Path
 from foretwin.orchestrator.drive.conductor import Conductor
 
@@ -27,11 +27,8 @@ def held(conductor):
     join(conductor)
 
 Conductor.join = held
-from foretwin.__main__ import main
-
-sys.exit(main())
 """
-"""A drive that listens to nobody before a file named `go` is there."""
+"""Makes a drive listen to nobody before a file named `go` is there."""
 
 SMALL = ("--speed", "max", "--futures", "6", "--rate", "0.5", "--end", "10")
 
@@ -91,7 +88,7 @@ def test_a_run_is_listed_no_sooner_than_it_can_be_spoken_to(
             return False
         return True
 
-    with started(out, *SMALL, entry=("-c", HELD_AT_JOIN)) as process:
+    with started(out, *SMALL, changed_by=HELD_AT_JOIN) as process:
         wait_for((tmp_path / "held").exists, "the drive to stand before it joins the bus")
         assert not is_listed()
         assert run(["set", "correction=follow", "--out", str(out)]) == EXIT_USER

@@ -28,17 +28,24 @@ from foretwin.orchestrator.runner.warm_fork import ForkedProcess, forked
 
 REPOSITORY = Path(__file__).parents[2]
 NUMBER_BYTES = 16
+_WHILE_IT_RUNS = ("scipy.stats.qmc", "pydantic.type_adapter")
+"""What a drive imports only as it draws its first cases, and typer as it reads the first words."""
 
 
 class WarmCommand:
-    """A command in a fork; to be used as a subprocess.Popen whose stderr goes to its stdout."""
+    """A command in a fork; to be used as a subprocess.Popen whose stderr goes to its stdout.
 
-    def __init__(self, words: list[str], *, cwd: Path, env: Mapping[str, str]) -> None:
+    `changed_by` is a program that the fork runs before the command, to change what it does.
+    """
+
+    def __init__(
+        self, words: list[str], *, cwd: Path, env: Mapping[str, str], changed_by: str = ""
+    ) -> None:
         there, self._code = os.pipe()[::-1]
         out, stdout = os.pipe()[::-1]
         self.stdout = os.fdopen(stdout, encoding="utf-8")
         self.returncode: int | None = None
-        asked = {"words": words, "cwd": str(cwd), "env": dict(env)}
+        asked = {"words": words, "cwd": str(cwd), "env": dict(env), "changed_by": changed_by}
         socket.send_fds(_interpreter(), [json.dumps(asked).encode()], [out, there])
         os.close(out)
         os.close(there)
@@ -100,6 +107,7 @@ def _be_command(asked: dict[str, Any], out: int) -> int:
     os.chdir(asked["cwd"])
     os.environ.clear()
     os.environ.update(asked["env"])
+    exec(asked["changed_by"], {})
     return run_module("foretwin", asked["words"])
 
 
@@ -109,6 +117,8 @@ def _serve(line: socket.socket) -> None:
         import_module(f"foretwin.{name}")
     for name in itertools.chain.from_iterable(IMPORTED_HERE.values()):
         import_module(f"foretwin.{name}")
+    for name in _WHILE_IT_RUNS:
+        import_module(name)
     running: dict[int, tuple[ForkedProcess, int]] = {}
     while True:
         ready = select.select([line, *running], [], [])[0]
