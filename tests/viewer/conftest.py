@@ -42,6 +42,7 @@ class ViewerRun:
         live: str = "none",
         start_stamp_ns: int = scene.START_NS,
         roll: Roll | None = None,
+        grace_s: float = 5.0,
     ) -> None:
         self.recording = folder / "monitor.rrd"
         self.log = folder / "log.jsonl"
@@ -56,7 +57,7 @@ class ViewerRun:
             vehicle_id=VEHICLE,
             bus=bus_setup,
             log_file=str(self.log),
-            grace_s=5.0,
+            grace_s=grace_s,
             file=str(self.recording),
             worlds_dir=str(worlds),
             drive_frame=scene.DRIVE_FRAME,

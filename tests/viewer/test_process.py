@@ -112,7 +112,7 @@ def test_the_file_is_complete_when_the_orchestrator_is_lost(start_viewer: StartV
     from foretwin.contracts.bus import ZenohBus
     from foretwin.contracts.setup import ViewerSetup, read_setup
 
-    run = start_viewer()
+    run = start_viewer(grace_s=1.0)
     setup = read_setup(run.recording.parent / "viewer.json", ViewerSetup)
     with ZenohBus(setup.bus) as orchestrator:
         orchestrator.declare_alive(alive_key(run=RUN, process="orchestrator"))
