@@ -75,7 +75,7 @@ def assert_all_is_recorded(run: Path, *, parts: int) -> None:
 
 def test_a_killed_recorder_comes_back_and_nothing_is_lost(tmp_path: Path) -> None:
     out = tmp_path / "runs"
-    with started(out, *LIVE, "--end", "12") as process:
+    with started(out, *LIVE, "--end", "9") as process:
         run = recorded_for_a_while(out)
         victim = child_pids(run)["recorder"]
         os.kill(victim, signal.SIGKILL)
