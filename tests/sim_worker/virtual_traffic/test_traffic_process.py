@@ -17,10 +17,7 @@ from foretwin.sim_worker.virtual_traffic.process import TrafficWorker
 from tests.contracts.memory_bus import MemoryBus
 from tests.sim_worker.places import crossroads, state_at, straight_path
 
-COVERS = (
-    "foretwin.sim_worker.virtual_traffic.process",
-    "foretwin.sim_worker.virtual_traffic.__main__",
-)
+COVERS = ("foretwin.sim_worker.virtual_traffic.process",)
 
 
 class Ground:
