@@ -44,6 +44,7 @@ from foretwin.orchestrator.commands.error_lines import (
     usage_line,
 )
 from foretwin.orchestrator.commands.told import CommandResult, told
+from foretwin.world_gen.export.formats import DEFAULT_FORMAT, FORMATS
 
 EXIT_USER, EXIT_INTERRUPTED = USER, INTERRUPTED
 _NO_FOLDER = IsADirectoryError, NotADirectoryError
@@ -116,8 +117,8 @@ def world(
         str | None,
         typer.Option(
             "--format",
-            help="mjcf, sdf, opendrive, lanelet2, commonroad, geojson, svg or png "
-            "[default: as the suffix of --out says; mjcf for .xml and in a folder]",
+            help=f"{', '.join(FORMATS)} "
+            f"[default: as the suffix of --out says; {DEFAULT_FORMAT} for .xml and in a folder]",
         ),
     ] = None,
     radius_m: Annotated[

@@ -6,15 +6,18 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from foretwin.contracts.vehicle import VehicleParameters
-from foretwin.contracts.world import World
 from foretwin.world_gen.export.choices import (
     Lanelet2Dialect,
     OpenDriveVersion,
     Simulator,
     VehicleKind,
 )
+
+if TYPE_CHECKING:  # the command line reads the table for its help, and starts without numpy
+    from foretwin.contracts.vehicle import VehicleParameters
+    from foretwin.contracts.world import World
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -30,7 +33,7 @@ class ExportOptions:
     vehicle: VehicleParameters | None = None
 
 
-Writer = Callable[[World, Path, ExportOptions], None]
+Writer = Callable[["World", Path, ExportOptions], None]
 
 
 @dataclass(frozen=True, slots=True)

@@ -13,6 +13,7 @@ from foretwin.contracts.versions import versions
 from foretwin.orchestrator.commands.cli import app, run
 from foretwin.orchestrator.commands.cli_help import EXAMPLE
 from foretwin.orchestrator.config import DriveConfig
+from foretwin.world_gen.export.formats import FORMATS
 
 COVERS = (
     "foretwin.orchestrator.commands.cli",
@@ -100,6 +101,13 @@ def test_a_choice_of_a_drive_is_said_in_its_help(capsys: pytest.CaptureFixture[s
     shown = " ".join(help_of("drive", capsys).split())
     for choices in ("auto, native, web", "off, report, apply", "log, standin, live", "auto, off"):
         assert choices in shown
+
+
+def test_the_help_names_each_format_that_a_world_is_written_in(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    shown = " ".join(help_of("world", capsys).split())
+    assert f"{', '.join(FORMATS)} [default:" in shown
 
 
 def test_the_version_stands_in_a_line_with_those_of_its_libraries(
