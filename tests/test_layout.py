@@ -14,6 +14,7 @@ ROOMS = (
     "contracts", "geometry", "telemetry", "world_gen", "sim_worker", "orchestrator", "viewer",
 )  # fmt: skip
 LIMIT_LINES = 300
+CODE = (".py", ".js", ".css", ".html", ".j2", ".cc")
 
 MACHINE_PATH = re.compile(r"(?<![\w.~-])/(?:work|root|home)(?=/|\b)")
 INDEX_ADDRESS = re.compile(r"pypi" + r"\.org|pythonhosted|index-url|simple/\s*$", re.MULTILINE)
@@ -72,8 +73,8 @@ def test_zenoh_is_known_to_the_bus_alone() -> None:
     ]
 
 
-def test_python_files_stay_readable() -> None:
-    lengths = {name: text.count("\n") for name, text in texts() if name.endswith(".py")}
+def test_files_of_code_stay_readable() -> None:
+    lengths = {name: text.count("\n") for name, text in texts() if name.endswith(CODE)}
 
     assert {name: n for name, n in lengths.items() if n > LIMIT_LINES} == {}
 

@@ -34,6 +34,7 @@ _FILES = {
     "copilot.css": ("copilot.css", "text/css"),
     "copilot.js": ("copilot.js", "text/javascript"),
     "drawing.js": ("drawing.js", "text/javascript"),
+    "sound.js": ("sound.js", "text/javascript"),
     "icon.svg": ("icon.svg", "image/svg+xml"),
 }
 _HEADERS = {

@@ -1,5 +1,6 @@
 // The co-pilot display: takes frames from the server and shows each whole; keeps nothing but the last.
 import { Plan } from "./drawing.js";
+import { beep, speak, wake } from "./sound.js";
 
 const element = (id) => document.getElementById(id);
 const OLD_S = 1.2;        // a frame that was made so long ago is not current
@@ -107,21 +108,8 @@ function alertOf(alerts) {
 }
 
 // Sound and speech: off until somebody asks for them.
-let audio = null;
 const pressed = (id) => element(id).getAttribute("aria-pressed") === "true";
-
-function beep(times, hertz) {
-  if (!audio) return;
-  for (let i = 0; i < times; i += 1) {
-    const tone = audio.createOscillator(), loud = audio.createGain(), at = audio.currentTime + 0.22 * i;
-    tone.frequency.value = hertz;
-    loud.gain.setValueAtTime(0.2, at);
-    loud.gain.exponentialRampToValueAtTime(0.001, at + 0.18);
-    tone.connect(loud).connect(audio.destination);
-    tone.start(at);
-    tone.stop(at + 0.2);
-  }
-}
+const say = (text) => { if (!speak(text)) toast("no voice on this machine"); };
 
 function notice(frame, level) {
   const rises = LEVELS.indexOf(level) > LEVELS.indexOf(own.level) && level !== "calm";
@@ -129,20 +117,10 @@ function notice(frame, level) {
   const news = [frame.ahead ? frame.ahead.name : "", rises ? level : "", alert].join("|");
   if (pressed("sound") && rises) beep(level === "danger" ? 3 : 1, level === "danger" ? 1400 : 900);
   if (pressed("sound") && alert && alert !== own.alert) beep(2, 500);
-  if (pressed("speech") && (news !== own.said || rises)) speak(alert ? frame.alerts[0].text : frame.sentence);
+  if (pressed("speech") && (news !== own.said || rises)) say(alert ? frame.alerts[0].text : frame.sentence);
   own.level = level;
   own.said = news;
   own.alert = alert;
-}
-
-function speak(text) {
-  // Voices of a network would tell somebody where the car is.
-  const voice = speechSynthesis.getVoices().find((one) => one.localService && one.lang.startsWith("en"));
-  if (!voice) return toast("no voice on this machine");
-  const said = new SpeechSynthesisUtterance(text.replaceAll(" · ", ", ").replaceAll("×", "and"));
-  said.voice = voice;
-  speechSynthesis.cancel();
-  speechSynthesis.speak(said);
 }
 
 // Marks.
@@ -208,8 +186,8 @@ light.addEventListener("change", theme);
 function toggle(id) {
   const on = !pressed(id);
   element(id).setAttribute("aria-pressed", `${on}`);
-  if (id === "sound" && on) audio ??= new AudioContext();
-  if (id === "speech" && on && own.frame) speak(own.frame.sentence);
+  if (id === "sound" && on) wake();
+  if (id === "speech" && on && own.frame) say(own.frame.sentence);
 }
 
 // Roles.
