@@ -79,6 +79,14 @@ def test_files_of_code_stay_readable() -> None:
     assert {name: n for name, n in lengths.items() if n > LIMIT_LINES} == {}
 
 
+def test_metres_of_a_degree_are_said_once() -> None:
+    said = re.compile(r"\b111_?\d{3}\b|\b6_?37[18]_?\d{3}\b")
+    rooms = [(name, text) for name, text in texts() if name.split("/")[0] in ROOMS]
+
+    found = [name for name, text in rooms if name.endswith(".py") and said.search(text)]
+    assert found == ["contracts/frames.py"]
+
+
 def test_no_file_is_named_after_nothing() -> None:
     nameless = {"utils", "util", "common", "helpers", "helper", "manager", "misc"}
     names = [path.relative_to(ROOT) for path in tracked_files()]

@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 import pyproj
 
+from foretwin.contracts import frames
 from foretwin.contracts.arrays import Array, Flags, Indices
 from foretwin.contracts.frames import GeoPoint, LocalFrame, geo_from_ecef, local_from_geo
 from foretwin.telemetry.logs import units
@@ -145,11 +146,9 @@ def _geographic(columns: dict[str, Array], time_s: Array, new: _Changes) -> list
             middle = (float(np.nanmedian(lat_deg)), float(np.nanmedian(lon_deg)))
             at = (np.abs(lat_deg - middle[0]) < 3.0) & (np.abs(lon_deg - middle[1]) < 3.0)
             rows, lat_deg, lon_deg = rows[at], lat_deg[at], lon_deg[at]
-            if not _moves_like_a_car(
-                time_s[rows],
-                np.stack([lon_deg * math.cos(math.radians(middle[0])), lat_deg], axis=1)
-                * 111_195.0,
-            ):
+            east_deg = lon_deg * math.cos(math.radians(middle[0]))
+            rough_m = np.stack([east_deg, lat_deg], axis=1) * frames.METRES_PER_DEG
+            if not _moves_like_a_car(time_s[rows], rough_m):
                 continue
             xy_m = local_from_geo(LocalFrame(GeoPoint(*middle)), lat_deg, lon_deg)
             fields = {"latitude": lat, "longitude": lon}
