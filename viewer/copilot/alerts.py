@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Literal, NamedTuple
+from typing import Literal, NamedTuple, get_args
 
 from foretwin.contracts.drive import VehicleState
 from foretwin.contracts.gap import Culprit, GapAlarm, Verdict
@@ -25,16 +25,8 @@ Kind = Literal[
 ]
 GRAVE: tuple[Kind, ...] = ("ended", "link", "process", "telemetry")
 """Where one of these is the cause, nothing else on the display can be believed."""
-_ORDER: tuple[Kind, ...] = (
-    *GRAVE,
-    "injection",
-    "verdict",
-    "gap",
-    "rounds",
-    "off_map",
-    "worker",
-    "event",
-)
+_ORDER: tuple[Kind, ...] = get_args(Kind)
+"""The gravest first."""
 
 STALE_S = 1.0
 """So old may the newest state be, as in the drive itself."""
@@ -150,7 +142,9 @@ class Alerts:
         if (verdict := self.accused) is not None:
             found.append(Alert("verdict", f"verdict: {plain(verdict.text)}"))
         if self._gaps:
-            found.append(Alert("gap", f"gap beyond limit: {', '.join(map(_gap, self._said_gaps))}"))
+            found.append(
+                Alert("gap", f"gap beyond limit: {', '.join(map(_gap, self._gaps.values()))}")
+            )
         found += self._rounds(now_s)
         if self._progress is not None and self._progress.mission_state == "off_map":
             found.append(Alert("off_map", "off the map: no rounds"))
@@ -163,10 +157,6 @@ class Alerts:
         if self._event is not None and now_s - self._event[0] <= EVENT_SHOWN_S:
             found.append(Alert("event", plain(self._event[1].text)))
         return sorted(found, key=lambda one: _ORDER.index(one.kind))
-
-    @property
-    def _said_gaps(self) -> list[GapAlarm]:
-        return list(self._gaps.values())
 
     def _telemetry(self, now_s: float) -> list[Alert]:
         age_s = now_s - self._heard_s
