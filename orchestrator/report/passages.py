@@ -38,8 +38,6 @@ class JunctionPassed(NamedTuple):
     shown_round: TableRow | None
     futures: int
     collided: int
-    graver: int
-    """Futures at or beyond `AMBER_FROM`."""
 
     @property
     def anchor(self) -> str:
@@ -158,12 +156,7 @@ def _passage(
         shown_round=shown,
         futures=counted,
         collided=0 if futures is None else pc.sum(futures["collided"]).as_py() or 0,
-        graver=0 if futures is None else _at_least(futures, AMBER_FROM),
     )
-
-
-def _at_least(futures: pa.Table, limit: float) -> int:
-    return int(pc.sum(pc.greater_equal(futures["criticality"], limit)).as_py() or 0)
 
 
 def worst_of(futures: pa.Table | None, most: int) -> tuple[TableRow, ...]:

@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 from PIL import Image
 
-from foretwin.contracts.arrays import Array, Array32, Indices
+from foretwin.contracts.arrays import Array32, Indices
 from foretwin.contracts.camera_image import CameraImage
 from foretwin.contracts.world import World
 from foretwin.sim_worker.sensors.base_motion import BaseMotion, sensor_motion
@@ -166,13 +166,3 @@ def message_of(rgb: Picture, sensor: SensorFile, *, stamp_ns: int) -> CameraImag
         sensor=sensor.name,
         mount=sensor.mount,
     )
-
-
-def pixels_of(camera: Camera, places_m: Array) -> Array:
-    """Return (N, 2) where places (N, 3) in the camera's own axes are in its pictures.
-
-    Columns from the left edge and rows from the upper one: the first pixel's middle is (0.5, 0.5).
-    """
-    x, y, z = places_m.T
-    middle = np.array([camera.width_px, camera.height_px]) / 2.0
-    return np.asarray(middle - camera.focal_px * np.stack([y / x, z / x], axis=1))

@@ -61,7 +61,6 @@ class TurningGap(NamedTuple):
     """
 
     stamp_ns: Stamps
-    model_radps: Array
     error_radps: Array
     half_width_radps: Array
     file_error_radps: Array
@@ -260,7 +259,6 @@ def _told(
         )
     return TurningGap(
         stamp_ns=record.stamp_ns[starts + _SECOND // 2],
-        model_radps=said - fit.sizes[2],
         error_radps=error,
         half_width_radps=half,
         file_error_radps=design[:, 0] + fit.sizes[2] - seen,

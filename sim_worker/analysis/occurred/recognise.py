@@ -16,7 +16,7 @@ from foretwin.sim_worker.analysis.occurred.ego_manoeuvres import EgoStretch, ego
 from foretwin.sim_worker.analysis.occurred.measures import finite, measures_of
 from foretwin.sim_worker.analysis.occurred.preventable import Prevented, prevented
 from foretwin.sim_worker.analysis.occurred.roads import Roads
-from foretwin.sim_worker.analysis.occurred.rows import MEANINGS, USER_TAGS, OccurredScenario
+from foretwin.sim_worker.analysis.occurred.rows import OPENLABEL, USER_TAGS, OccurredScenario
 from foretwin.sim_worker.analysis.occurred.scene import (
     Detected,
     DrivenMotion,
@@ -112,7 +112,7 @@ def _own_row(way: DrivenWay, one: EgoStretch) -> OccurredScenario:
         junction_id=one.junction_id,
         side=one.side,
         ego_speed_mps=float(way.ego.speed_mps[one.first]),
-        tags=MEANINGS[one.kind].openlabel,
+        tags=OPENLABEL[one.kind],
     )
 
 
@@ -130,7 +130,7 @@ def _met_row(
     lead = way.path.pose_at(on.arc_m[own : own + 1].copy()).yaw_rad[0]
     along = float(course.velocity_mps[own] @ [np.cos(lead), np.sin(lead)])
     speed = float(way.ego.speed_mps[first])
-    tags = (*MEANINGS[met.kind].openlabel, *_user_tag(course.kind))
+    tags = (*OPENLABEL[met.kind], *_user_tag(course.kind))
     return OccurredScenario(
         kind=met.kind,
         begin_ns=int(stamps[first]),

@@ -10,116 +10,35 @@ from foretwin.contracts.drive import RoadUserKind
 from foretwin.sim_worker.metrics.encroachment import STOPPING_DECEL_MPS2
 from foretwin.sim_worker.metrics.time_to_collision import EXPOSED_BELOW_S
 
-EgoKind = Literal[
-    "through_straight",
-    "turn_left",
-    "turn_right",
-    "u_turn",
-    "lane_change_left",
-    "lane_change_right",
-    "stop",
-    "standstill",
-    "following",
-]
-AlongKind = Literal[
-    "cut_in",
-    "cut_out",
-    "lead_decelerates",
-    "stationary_ahead",
-    "parked_beside",
-    "overtakes_ego",
-    "ego_overtakes",
-]
-AcrossKind = Literal[
-    "crossing_from_left",
-    "crossing_from_right",
-    "oncoming_turns_across",
-    "ego_turns_across_oncoming",
-    "same_direction_turns_across",
-    "ego_turns_across_same_direction",
-    "turns_into_path",
-    "ego_turns_into_path",
-    "pedestrian_crossing",
-    "cyclist_crossing",
-]
-
-
-class KindMeaning(NamedTuple):
-    """What a kind says; where it stands in ISO 34502's structure, as others tell of that standard,
-    "" where it has no class there; and its tags of ASAM OpenLABEL 1.0's scenario ontology."""
-
-    meaning: str
-    iso_34502: str
-    openlabel: tuple[str, ...]
-
-
-_LANE_KEEP, _CHANGE = "main roadway, subject keeps lane, ", "main roadway, subject changes lane"
-MEANINGS: dict[str, KindMeaning] = {
-    "through_straight": KindMeaning(
-        "the car goes straight on through a junction", "", ("MotionDrive",)
-    ),
-    "turn_left": KindMeaning("the car turns left", "", ("MotionTurnLeft",)),
-    "turn_right": KindMeaning("the car turns right", "", ("MotionTurnRight",)),
-    "u_turn": KindMeaning("the car turns back", "", ("MotionUTurn",)),
-    "lane_change_left": KindMeaning(
-        "the car changes to the lane on its left", _CHANGE, ("MotionLaneChangeLeft",)
-    ),
-    "lane_change_right": KindMeaning(
-        "the car changes to the lane on its right", _CHANGE, ("MotionLaneChangeRight",)
-    ),
-    "stop": KindMeaning("the car brakes to a standstill", "", ("MotionStop",)),
-    "standstill": KindMeaning("the car stands", "", ("MotionStop",)),
-    "following": KindMeaning("the car drives behind another", "", ("MotionDrive",)),
-    "cut_in": KindMeaning(
-        "another comes into the car's lane ahead of it", _LANE_KEEP + "cut-in", ("MotionCutIn",)
-    ),
-    "cut_out": KindMeaning(
-        "the one ahead leaves the car's lane", _LANE_KEEP + "cut-out", ("MotionCutOut",)
-    ),
-    "lead_decelerates": KindMeaning(
-        "the one ahead brakes", _LANE_KEEP + "deceleration", ("MotionDecelerate",)
-    ),
-    "stationary_ahead": KindMeaning("somebody stands in the car's way", "", ("MotionStop",)),
-    "parked_beside": KindMeaning(
-        "the car passes close by a vehicle that stands", "", ("MotionStop",)
-    ),
-    "overtakes_ego": KindMeaning(
-        "another passes the car, driving the same way", "", ("MotionOvertake",)
-    ),
-    "ego_overtakes": KindMeaning(
-        "the car passes another that drives the same way", "", ("MotionOvertake",)
-    ),
-    "crossing_from_left": KindMeaning(
-        "a vehicle crosses the car's way from its left", "", ("MotionCross",)
-    ),
-    "crossing_from_right": KindMeaning(
-        "a vehicle crosses the car's way from its right", "", ("MotionCross",)
-    ),
-    "oncoming_turns_across": KindMeaning(
-        "an oncoming vehicle turns across the car's way", "", ("MotionTurn", "MotionCross")
-    ),
-    "ego_turns_across_oncoming": KindMeaning(
-        "the car turns across an oncoming vehicle's way", "", ("MotionTowards",)
-    ),
-    "same_direction_turns_across": KindMeaning(
-        "a vehicle that drives beside the car turns across its way",
-        "",
-        ("MotionTurn", "MotionCross"),
-    ),
-    "ego_turns_across_same_direction": KindMeaning(
-        "the car turns across the way of one that goes on beside it", "", ("MotionDrive",)
-    ),
-    "turns_into_path": KindMeaning(
-        "a vehicle turns from another road into the car's way ahead", "", ("MotionTurn",)
-    ),
-    "ego_turns_into_path": KindMeaning("the car turns into another's way", "", ("MotionDrive",)),
-    "pedestrian_crossing": KindMeaning(
-        "somebody on foot crosses the car's way", "", ("MotionWalk", "MotionCross")
-    ),
-    "cyclist_crossing": KindMeaning(
-        "a cyclist crosses the car's way", "", ("MotionDrive", "MotionCross")
-    ),
+OPENLABEL: dict[str, tuple[str, ...]] = {
+    "through_straight": ("MotionDrive",),
+    "turn_left": ("MotionTurnLeft",),
+    "turn_right": ("MotionTurnRight",),
+    "u_turn": ("MotionUTurn",),
+    "lane_change_left": ("MotionLaneChangeLeft",),
+    "lane_change_right": ("MotionLaneChangeRight",),
+    "stop": ("MotionStop",),
+    "standstill": ("MotionStop",),
+    "following": ("MotionDrive",),
+    "cut_in": ("MotionCutIn",),
+    "cut_out": ("MotionCutOut",),
+    "lead_decelerates": ("MotionDecelerate",),
+    "stationary_ahead": ("MotionStop",),
+    "parked_beside": ("MotionStop",),
+    "overtakes_ego": ("MotionOvertake",),
+    "ego_overtakes": ("MotionOvertake",),
+    "crossing_from_left": ("MotionCross",),
+    "crossing_from_right": ("MotionCross",),
+    "oncoming_turns_across": ("MotionTurn", "MotionCross"),
+    "ego_turns_across_oncoming": ("MotionTowards",),
+    "same_direction_turns_across": ("MotionTurn", "MotionCross"),
+    "ego_turns_across_same_direction": ("MotionDrive",),
+    "turns_into_path": ("MotionTurn",),
+    "ego_turns_into_path": ("MotionDrive",),
+    "pedestrian_crossing": ("MotionWalk", "MotionCross"),
+    "cyclist_crossing": ("MotionDrive", "MotionCross"),
 }
+"""Tags of ASAM OpenLABEL 1.0's scenario ontology, by kind; docs/occurred.md says what each is."""
 USER_TAGS: dict[RoadUserKind, str] = {
     "car": "VehicleCar",
     "van": "VehicleVan",

@@ -33,7 +33,7 @@ def picture(*junctions_at_m: float) -> str:
         time_s=np.array([0.0, 1000.0]),
     )
     passed = [
-        JunctionPassed(number, {"lat": lat, "lon": lon}, (), (), (), None, 0, 0, 0)
+        JunctionPassed(number, {"lat": lat, "lon": lon}, (), (), (), None, 0, 0)
         for number, (lat, lon) in enumerate(geo(*((at_m, 0.0) for at_m in junctions_at_m)).tolist())
     ]
     drawn = route_svg(way, [], passed)

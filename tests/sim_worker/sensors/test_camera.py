@@ -9,11 +9,12 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from foretwin.contracts.arrays import Array
 from foretwin.contracts.errors import UserError
 from foretwin.contracts.frames import LocalPose
 from foretwin.contracts.point_cloud import Mount
 from foretwin.sim_worker.sensors.base_motion import BaseMotion, sensor_motion
-from foretwin.sim_worker.sensors.camera import CameraView, CameraWorld, pixels_of
+from foretwin.sim_worker.sensors.camera import CameraView, CameraWorld
 from foretwin.sim_worker.sensors.kinds import Camera
 from foretwin.sim_worker.sensors.moving_boxes import NO_BODIES, MovingBoxes
 from foretwin.sim_worker.sensors.offscreen import check_drawing
@@ -58,6 +59,13 @@ def outline(view: CameraView, body: int = 0) -> list[int]:
     """First and last column, first and last row of a body."""
     rows, columns = np.nonzero(view.body == body)
     return [columns.min(), columns.max(), rows.min(), rows.max()]
+
+
+def pixels_of(camera: Camera, places_m: Array) -> Array:
+    """Places (N, 3) in a pinhole's own axes as columns and rows (N, 2) from its upper left edge."""
+    x, y, z = places_m.T
+    middle = np.array([camera.width_px, camera.height_px]) / 2.0
+    return np.asarray(middle - camera.focal_px * np.stack([y / x, z / x], axis=1))
 
 
 @pytest.mark.parametrize(
