@@ -140,7 +140,7 @@ def sentence(
     threat = danger_text(danger, elapsed_s=elapsed_s) if known else "no futures now"
     ago = f" {elapsed_s:.0f} s ago" if elapsed_s > OLD_ROUND_S else ""
     if danger is not None:
-        threat = f"likeliest danger{ago}: {threat}"
+        threat = f"greatest danger{ago}: {threat}"
     elif known:
         threat += ago
     return " · ".join(part for part in (*where, threat, standing.text) if part)

@@ -40,7 +40,7 @@ def test_a_round_is_as_old_as_the_state_that_it_began_with_whenever_it_comes() -
     drive.take("round", a_round(6.0 - OLD_ROUND_S - 0.1))
     old = drive.frame()
     assert (old.round_old, old.level) == (True, "danger")
-    assert "likeliest danger 2 s ago: car" in old.sentence
+    assert "greatest danger 2 s ago: car" in old.sentence
     drive.take("round", a_round(6.0 - ROUND_FOR_S - 0.1))
     assert (drive.frame().danger, drive.frame().level) == (None, "none")
 

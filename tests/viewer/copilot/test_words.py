@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import msgspec
+import numpy as np
 import pytest
 
 from foretwin.contracts.gap import Culprit, Verdict, limits_after
 from foretwin.contracts.simulation import MirrorSample, PlaneState, Progress
 from foretwin.viewer.copilot import words
-from foretwin.viewer.danger import Danger
+from foretwin.viewer.danger import Danger, dangers_of
+from tests.viewer.copilot.rounds import line, round_of
 
 NAME = "Charlottenstraße × Kronenstraße"  # noqa: RUF001
 PLACE = PlaneState(0.0, 0.0, 0.0, 8.0)
@@ -64,9 +66,20 @@ def changed(message: msgspec.Struct, **fields: object) -> object:
 def test_one_sentence_says_when_where_who_waits_what_threatens_and_the_twin() -> None:
     said = words.sentence(AHEAD, "give way", CAR, words.standing_of(IN_STEP, None), elapsed_s=0.5)
     assert said == (
-        f"4 s · {NAME} · give way · "
-        "likeliest danger: car from the right, 12 %, 2.1 s · twin in step"
+        f"4 s · {NAME} · give way · greatest danger: car from the right, 12 %, 2.1 s · twin in step"
     )
+
+
+def test_the_danger_that_is_told_is_the_greatest_and_need_not_be_the_likeliest() -> None:
+    """Somebody on foot who hardly comes, but would be killed, ranks before a car that does come."""
+    foot, car = line((20.0, -20.0), (0.0, 10.0)), line((20.0, 20.0), (0.0, -10.0))
+    seen = round_of(("pedestrian", foot, 5e-3), ("car", car, 2e-3))
+    seen = msgspec.structs.replace(seen, likelihood=np.array([1.0, 0.006, 0.9], dtype=np.float32))
+    first, second = dangers_of(seen)
+
+    assert (first.odds, second.odds) == ("1 in 200", "90 %")
+    said = words.sentence(AHEAD, "give way", first, words.standing_of(IN_STEP, None))
+    assert "greatest danger: pedestrian from the right, 1 in 200" in said
 
 
 @pytest.mark.parametrize(
