@@ -23,6 +23,7 @@ from tests.sim_worker.scenarios.worlds import ring
         ({"control_hz": 0.0}, "control_hz 0: above 0"),
         ({"reward": 3}, "reward 3: a function of StepFacts"),
         ({"vehicle": "tank"}, "tank"),
+        ({"horizon": 20.0}, "unknown setting 'horizon'; known: .*horizon_s"),
         ({"control": "steer"}, "control 'steer' is none of free, along_path"),
     ],
 )

@@ -258,11 +258,6 @@ def test_options_that_do_not_fit_say_so(options: dict[str, Any], says: str) -> N
         to_refuse().reset(options=options)
 
 
-def test_a_setting_that_nobody_knows_is_named() -> None:
-    with pytest.raises(UserError, match=r"unknown setting 'horizon'; known: .*horizon_s"):
-        JunctionEnv(ring(), horizon=20.0)
-
-
 def test_options_that_did_not_fit_are_forgotten() -> None:
     env = JunctionEnv(ring(), cases=4)
     for options in ({"scenario": "nothing"}, {"cases": 5, "case": 5}):
