@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 from foretwin.contracts.bus import Received
 from foretwin.contracts.keys import TELEMETRY_CHANNELS
+from foretwin.contracts.too_old import STALE_S
 from foretwin.contracts.trace import item_name, span
 from foretwin.orchestrator.drive.conductor import Conductor
 from foretwin.orchestrator.drive.missed_end import MissedEnd
@@ -30,8 +31,6 @@ any more: what the car is shown is as old as the state that it is of."""
 UNPLACED_S = 5.0
 """So long after a restart nothing falls due before it is known where the car is; then it does where
 it did before."""
-STALE_AFTER_S = 1.0
-"""No round starts from a state older than this, in seconds of the drive's clock."""
 
 
 class RoundGrid(NamedTuple):
@@ -197,7 +196,7 @@ class LiveLoop:
         age_s = math.inf if latest is None else now_s - latest.receipt_mono_ns / 1e9
         if rounds.open:
             rounds.tally.missed += 1
-        elif age_s * speed <= STALE_AFTER_S:
+        elif age_s * speed <= STALE_S:
             with span("start a round"):
                 conductor.start_round()
         elif self._telemetry_waits():

@@ -23,6 +23,7 @@ from foretwin.contracts.futures import (
 )
 from foretwin.contracts.job_identity import vehicle_digest
 from foretwin.contracts.scenario import Scenario
+from foretwin.contracts.too_old import LIGHT_FOR_S
 from foretwin.contracts.trace import traced
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.contracts.world import World
@@ -39,7 +40,6 @@ from foretwin.sim_worker.metrics.table import ROW_METRICS
 from foretwin.sim_worker.scenarios.live import KnownScenarios
 from foretwin.sim_worker.scenarios.reading import catalogue, find_scenario
 from foretwin.sim_worker.scenarios.roads import RoadNetwork
-from foretwin.world_gen.rules.signal_state import LIVE_FOR_S
 
 HEEDLESS_PLANNER = "constant_speed"
 PLAN_FRESH_NS = 1_000_000_000
@@ -203,7 +203,7 @@ def _begun_by_car(path: PathAhead, state: VehicleState, frame: LocalFrame) -> Pa
 
 
 def _signals(states: tuple[SignalState, ...], state: VehicleState) -> tuple[SignalState, ...]:
-    fresh_ns = LIVE_FOR_S * 1e9
+    fresh_ns = LIGHT_FOR_S * 1e9
     return tuple(s for s in states if abs(state.stamp_ns - s.stamp_ns) <= fresh_ns)
 
 

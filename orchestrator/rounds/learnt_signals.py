@@ -13,7 +13,8 @@ from typing import Any, NamedTuple
 
 from foretwin.contracts.drive import SignalColour, SignalState
 from foretwin.contracts.signals import LearntSignal
-from foretwin.world_gen.rules.signal_state import LIVE_FOR_S, heard_cycle
+from foretwin.contracts.too_old import LIGHT_FOR_S
+from foretwin.world_gen.rules.signal_state import heard_cycle
 
 MOST_SIGNALS = 1000
 """Signal groups that are listened to."""
@@ -67,7 +68,7 @@ class _Group:
             # Another plan, or none: what was heard before says nothing of it.
             self._learnt = None
             self._changes.clear()
-        if gap_s > LIVE_FOR_S or signal.colour in _NO_CYCLE or known.colour in _NO_CYCLE:
+        if gap_s > LIGHT_FOR_S or signal.colour in _NO_CYCLE or known.colour in _NO_CYCLE:
             self._follows = False
         elif signal.colour != known.colour:
             at_ns = (known.stamp_ns + signal.stamp_ns) // 2

@@ -14,13 +14,12 @@ from collections.abc import Collection, Sequence
 from itertools import pairwise
 from typing import NamedTuple
 
+from foretwin.contracts.too_old import LATE_ROUNDS, OF_ROUNDS
+
 SHARES = (0.75, 0.5, 0.25)
 """Of the futures asked for: what rounds may fall to, first to last."""
 SPARE = 0.8
 """A round of a pace that fits takes at most so much of its time."""
-LATE_ROUNDS, OF_ROUNDS = 2, 4
-"""So many late ones among the last rounds, and the next is smaller: one alone may be a World that
-a worker has to load."""
 CALM_PERIODS, MOST_CALM_PERIODS, LEAST_CALM_ROUNDS = 10, 60, 4
 """So many periods with room to spare, as many more for each fall remembered, and it grows again."""
 CALM_SHARE = 0.9

@@ -14,9 +14,10 @@ from foretwin.contracts.drive import SignalColour, SignalState
 from foretwin.contracts.frames import geo_pose
 from foretwin.contracts.lights import ShownLight, ShownLights, StopPlace, WhyShown
 from foretwin.contracts.signals import LearntSignal, SignalPlan
+from foretwin.contracts.too_old import LIGHT_FOR_S
 from foretwin.contracts.world import World
 from foretwin.orchestrator.runtime_configuration.handler import Made, RefusedError
-from foretwin.world_gen.rules.signal_state import LIVE_FOR_S, colours_at, cycle_s
+from foretwin.world_gen.rules.signal_state import colours_at, cycle_s
 
 AUTO = "auto"
 """Gives a light back to plan and car."""
@@ -80,7 +81,7 @@ class LightsInForce:
         learnt: Iterable[LearntSignal],
     ) -> ShownLights:
         """Return what all lights show at a stamp of the vehicle; `start_ns` is drive time 0."""
-        fresh_ns = LIVE_FOR_S * 1e9
+        fresh_ns = LIGHT_FOR_S * 1e9
         cycles = {
             one.group_id: _ColourCourse(
                 (one.begins_ns - start_ns) / 1e9, one.cycle_s, one.from_s, one.colours

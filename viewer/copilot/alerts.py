@@ -8,6 +8,7 @@ from foretwin.contracts.drive import VehicleState
 from foretwin.contracts.gap import Culprit, GapAlarm, Verdict
 from foretwin.contracts.simulation import Event, Progress, RoundView, WorkerStatus
 from foretwin.contracts.terminal import plain
+from foretwin.contracts.too_old import LATE_ROUNDS, OF_ROUNDS, STALE_S
 from foretwin.contracts.towards_vehicle import Injection
 
 Kind = Literal[
@@ -28,12 +29,8 @@ GRAVE: tuple[Kind, ...] = ("ended", "link", "process", "telemetry")
 _ORDER: tuple[Kind, ...] = get_args(Kind)
 """The gravest first."""
 
-STALE_S = 1.0
-"""So old may the newest state be, as in the drive itself."""
 NO_ROUND_S = 4.0
 """So long may no round come where a junction is ahead: the slowest pace is one in two seconds."""
-LATE_OF, LATE_ROUNDS = 4, 2
-"""So many late rounds of so many are told, as the drive itself counts them."""
 EVENT_SHOWN_S = 12.0
 ACCUSES: tuple[Culprit, ...] = ("vehicle", "model", "both")
 
@@ -81,7 +78,7 @@ class Alerts:
 
     def round(self, view: RoundView, now_s: float) -> None:
         """Take a round."""
-        self._late = [*self._late[1 - LATE_OF :], view.late]
+        self._late = [*self._late[1 - OF_ROUNDS :], view.late]
         self._round_s, self._latency_ms = now_s, view.latency_ms
 
     def alive(self, process_id: str, *, up: bool) -> None:

@@ -5,10 +5,8 @@ from __future__ import annotations
 from foretwin.contracts.drive import SignalColour, SignalState
 from foretwin.contracts.lights import ShownLight, ShownLights
 from foretwin.contracts.terminal import plain
+from foretwin.contracts.too_old import LIGHT_FOR_S
 from foretwin.viewer.copilot.frame import AheadLight
-
-LIGHT_FOR_NS = 5_000_000_000
-"""So long a colour that was heard is shown."""
 
 
 class LightsNow:
@@ -31,7 +29,7 @@ class LightsNow:
         found = {
             group: _words(one.colour)
             for group, one in self._heard.items()
-            if abs(stamp_ns - one.stamp_ns) <= LIGHT_FOR_NS and one.colour != "unknown"
+            if abs(stamp_ns - one.stamp_ns) <= LIGHT_FOR_S * 1e9 and one.colour != "unknown"
         }
         for group, light in self._shown.items():
             if light.why == "set":

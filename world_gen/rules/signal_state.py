@@ -12,10 +12,8 @@ import numpy.typing as npt
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.drive import SignalColour
 from foretwin.contracts.signals import LearntSignal, SignalPlan
+from foretwin.contracts.too_old import LIGHT_FOR_S
 from foretwin.contracts.world import World
-
-LIVE_FOR_S = 2.0
-"""A live colour counts for so long; vehicles and roadside units repeat theirs at 1 Hz or more."""
 
 
 class LiveColour(NamedTuple):
@@ -69,7 +67,7 @@ def colours_at(
     """Return the colour of each group of a plan at a drive time.
 
     A group that the next phase lets go as well stays green in between. Those on foot get no
-    amber. What was heard no more than `LIVE_FOR_S` ago counts instead, unless it is `unknown`;
+    amber. What was heard no more than `LIGHT_FOR_S` ago counts instead, unless it is `unknown`;
     so does what is heard later than `time_s`, since clocks differ.
     """
     colours: dict[str, SignalColour] = {group.id: "red" for group in plan.groups}
@@ -89,7 +87,7 @@ def colours_at(
             break
         into_s -= step_s
     for name, heard in (live or {}).items():
-        if name in colours and time_s - heard.time_s <= LIVE_FOR_S and heard.colour != "unknown":
+        if name in colours and time_s - heard.time_s <= LIGHT_FOR_S and heard.colour != "unknown":
             colours[name] = heard.colour
     return colours
 

@@ -9,8 +9,9 @@ import pytest
 
 from foretwin.contracts.gap import GapAlarm
 from foretwin.contracts.simulation import Event, WorkerStatus
+from foretwin.contracts.too_old import STALE_S
 from foretwin.contracts.towards_vehicle import GateReason, GateState, Injection
-from foretwin.viewer.copilot.alerts import EVENT_SHOWN_S, NO_ROUND_S, STALE_S, Alert, Alerts
+from foretwin.viewer.copilot.alerts import EVENT_SHOWN_S, NO_ROUND_S, Alert, Alerts
 from tests.viewer.copilot.rounds import round_of
 from tests.viewer.copilot.test_words import AHEAD, verdict
 from tests.viewer.scene import state_at

@@ -12,10 +12,10 @@ from foretwin.contracts.drive import RoadUser, RoadUsers, SignalColour, SignalSt
 from foretwin.contracts.frames import GeoPoint
 from foretwin.contracts.lights import ShownLight, ShownLights, WhyShown
 from foretwin.contracts.simulation import ActiveWorld, RunEnd, WorldNotice
+from foretwin.contracts.too_old import LIGHT_FOR_S
 from foretwin.contracts.world import World
 from foretwin.viewer.colours import SEEN_FOR_NS
 from foretwin.viewer.copilot.frame import AheadFrame, AheadLight, PageFrame
-from foretwin.viewer.copilot.lights_now import LIGHT_FOR_NS
 from foretwin.viewer.copilot.now import DriveNow
 from foretwin.viewer.copilot.words import INJECTION_FOR_S
 from tests.viewer import scene
@@ -26,6 +26,7 @@ from tests.viewer.copilot.test_words import AHEAD
 from tests.viewer.scene import DRIVE_FRAME, START_NS, WORLD_ID, mirror_at, state_at
 
 COVERS = (
+    "foretwin.contracts.too_old",
     "foretwin.viewer.copilot.frame",
     "foretwin.viewer.copilot.lights_now",
     "foretwin.viewer.colours",
@@ -205,7 +206,7 @@ def test_what_the_car_detects_is_shown_while_it_is_fresh() -> None:
 def test_a_light_that_is_not_heard_any_more_is_not_shown() -> None:
     drive = Drive()
     drive.goes_on(10.0)
-    stamp_ns = state_at(10.0).stamp_ns - LIGHT_FOR_NS
+    stamp_ns = state_at(10.0).stamp_ns - round(LIGHT_FOR_S * 1e9)
     drive.take("signals", SignalState(stamp_ns=stamp_ns, group_id="g1", colour="green"))
     drive.take("signals", SignalState(stamp_ns=stamp_ns - 1, group_id="g2", colour="green"))
     drive.take("signals", SignalState(stamp_ns=stamp_ns, group_id="g3", colour="unknown"))
