@@ -25,6 +25,8 @@ RESULT_STEP_S = 0.1
 """Between two instants of a result, wherever futures are recorded, shown or learnt from."""
 SPEED_AHEAD_STEP_S = 0.5
 """Between two speeds that the nominal future aims at."""
+CAR_WITHIN_M = 60.0
+"""The car is looked for on this much of the path's beginning."""
 PATH_BEHIND_M = 10.0
 """How much of its path lies behind the car."""
 EngineName = Literal["mujoco", "multibody", "gazebo", "carla"]

@@ -29,6 +29,3 @@ PAGE: dict[str, Colour] = {
 }
 """What the co-pilot display takes of them, by the names of its style sheet; calm has no colour
 there, so that who cannot tell red from green misses nothing."""
-
-SEEN_FOR_NS = 1_000_000_000
-"""So long who was detected is shown."""

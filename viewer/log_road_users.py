@@ -7,7 +7,8 @@ import rerun as rr
 
 from foretwin.contracts.drive import RoadUsers
 from foretwin.contracts.frames import LocalFrame, local_from_geo, local_from_geo_yaw
-from foretwin.viewer.colours import SEEN_FOR_NS, Colour
+from foretwin.contracts.too_old import USERS_FOR_NS
+from foretwin.viewer.colours import Colour
 from foretwin.viewer.log_drive import PERIOD_NS
 from foretwin.viewer.rows import Row
 
@@ -49,7 +50,7 @@ class RoadUsersLog:
 
     def old(self, drive_ns: int) -> list[Row]:
         """Return what takes those away of whom nothing was told for a second."""
-        if self._last_ns is None or drive_ns - self._last_ns <= SEEN_FOR_NS:
+        if self._last_ns is None or drive_ns - self._last_ns <= USERS_FOR_NS:
             return []
         return self._none(drive_ns)
 

@@ -10,6 +10,7 @@ import numpy as np
 
 from foretwin.contracts.drive import RoadUser, RoadUsers, VehicleState
 from foretwin.contracts.frames import LocalFrame, local_from_geo
+from foretwin.contracts.too_old import USERS_FOR_NS
 from foretwin.contracts.virtual_traffic import TrafficCourse
 from foretwin.orchestrator.context import DriveContext
 from foretwin.orchestrator.drive import traffic_setup
@@ -17,7 +18,6 @@ from foretwin.orchestrator.drive.intake import Intake
 from foretwin.orchestrator.drive.questions import Questions
 from foretwin.orchestrator.drive.traffic_setup import TRAFFIC
 from foretwin.orchestrator.instructions import LatestReports, RoundIntent
-from foretwin.orchestrator.other_vehicles.measured import FRESH_NS
 from foretwin.orchestrator.runtime_configuration.handler import Made, RefusedError
 
 _STEP_NS = 50_000_000
@@ -92,10 +92,10 @@ class VirtualTrafficLink:
             )
         )
         virtual = self.latest
-        if virtual is None or abs(own.stamp_ns - virtual.stamp_ns) > FRESH_NS:
+        if virtual is None or abs(own.stamp_ns - virtual.stamp_ns) > USERS_FOR_NS:
             return reports
         users = reports.road_users
-        fresh = users is not None and abs(own.stamp_ns - users.stamp_ns) <= FRESH_NS
+        fresh = users is not None and abs(own.stamp_ns - users.stamp_ns) <= USERS_FOR_NS
         ids = {user.user_id for user in virtual.users}
         seen = users.users if fresh and users is not None else ()
         others = tuple(user for user in seen if user.user_id not in ids)

@@ -17,7 +17,6 @@ MOST_HEARD = 1000
 """States that wait for one of the car, and commands for one of their vehicle: the newest."""
 PERIOD_NS = 18_000_000
 """Between two states of a vehicle that are passed on: 50 Hz at most."""
-FRESH_NS = 500_000_000
 
 
 class OtherVehicleSource:

@@ -19,6 +19,7 @@ from foretwin.contracts.frames import local_from_geo
 from foretwin.contracts.keys import vehicle_that_joins
 from foretwin.contracts.mailbox import Reply
 from foretwin.contracts.roles import JoinRequest, OtherVehicles, Role
+from foretwin.contracts.too_old import USERS_FOR_NS
 from foretwin.orchestrator.context import DriveContext
 from foretwin.orchestrator.instructions import LatestReports
 from foretwin.orchestrator.other_vehicles.dead_reckoning import reckoned, reckoned_for_s
@@ -26,7 +27,7 @@ from foretwin.orchestrator.other_vehicles.detected import DetectedVehicle
 from foretwin.orchestrator.other_vehicles.encounter_handler import EncounterHandler
 from foretwin.orchestrator.other_vehicles.joined import JoinedVehicles
 from foretwin.orchestrator.other_vehicles.live import LiveVehicle
-from foretwin.orchestrator.other_vehicles.measured import FRESH_NS, OtherVehicleSource
+from foretwin.orchestrator.other_vehicles.measured import OtherVehicleSource
 from foretwin.orchestrator.other_vehicles.recorded import RecordedVehicle
 from foretwin.orchestrator.other_vehicles.surroundings import Measured, road_user, surroundings
 from foretwin.orchestrator.other_vehicles.vehicle_clock import (
@@ -229,7 +230,7 @@ class OtherVehicleFeed:
             if roles.get(name) in ("twin", "shadow") and self._is_known(name, own.stamp_ns)
         ]
         users = reports.road_users
-        fresh = users is not None and abs(own.stamp_ns - users.stamp_ns) <= FRESH_NS
+        fresh = users is not None and abs(own.stamp_ns - users.stamp_ns) <= USERS_FOR_NS
         seen = users.users if fresh and users is not None else ()
         same = self._same(seen, mine)
         detected = [

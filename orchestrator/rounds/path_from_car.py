@@ -18,6 +18,7 @@ import numpy as np
 
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.frames import wrap_angle
+from foretwin.contracts.futures import CAR_WITHIN_M
 from foretwin.geometry.polyline import arc_lengths, left_of, units
 
 HEADING_S, HEADING_M = 2.6, 2.0
@@ -25,8 +26,6 @@ HEADING_S, HEADING_M = 2.6, 2.0
 ASIDE_S, ASIDE_M = 5.0, 1.0
 ASIDE_SHARE = 0.33
 """This share of what the car lies aside fades, by 1/e over what is driven in so long."""
-CAR_WITHIN_M = 60.0
-"""The car is looked for on this much of the path's beginning."""
 _MOST_TURNED_RAD, _MOST_ASIDE_M = 0.5, 3.0
 """A car that heads or lies farther aside is turning, or on another lane: so much of it counts."""
 

@@ -16,7 +16,7 @@ from foretwin.contracts.forecast import (
     share_below,
 )
 from foretwin.contracts.frames import LocalFrame, local_from_geo
-from foretwin.contracts.futures import SeenRoadUser
+from foretwin.contracts.futures import CAR_WITHIN_M, SeenRoadUser
 from foretwin.contracts.trace import traced
 from foretwin.geometry.frenet_path import FrenetPath
 from foretwin.orchestrator.forecast.calibration import Calibration
@@ -32,7 +32,6 @@ from foretwin.orchestrator.forecast.own_error import with_own_error
 from foretwin.orchestrator.forecast.progress_model import ProgressModel
 from foretwin.orchestrator.instructions import RoundIntent
 from foretwin.orchestrator.rounds.arrival_band import ArrivalBand, arrival_band
-from foretwin.orchestrator.rounds.path_from_car import CAR_WITHIN_M
 from foretwin.orchestrator.runner.open_rounds import RoundDone
 from foretwin.sim_worker.driver_model import STANDING_MPS
 from foretwin.sim_worker.futures.likelihood import travelled_m

@@ -7,7 +7,7 @@ import numpy as np
 from foretwin.contracts.drive import RoadUser, RoadUsers, VehicleState
 from foretwin.contracts.frames import LocalFrame, local_from_geo, local_from_geo_yaw
 from foretwin.contracts.futures import SeenRoadUser
-from foretwin.orchestrator.other_vehicles.measured import FRESH_NS
+from foretwin.contracts.too_old import USERS_FOR_NS
 
 WITHIN_M = 120.0
 """Of the car: who is farther away does not meet it within a horizon."""
@@ -25,7 +25,7 @@ def near_car(
 
     Of more than `MOST_SEEN` those that are nearest, in the order in which they were told.
     """
-    if users is None or not users.users or abs(state.stamp_ns - users.stamp_ns) > FRESH_NS:
+    if users is None or not users.users or abs(state.stamp_ns - users.stamp_ns) > USERS_FOR_NS:
         return ()
     here = local_from_geo(frame, state.position.lat_deg, state.position.lon_deg)
     positions = np.array([(u.position.lat_deg, u.position.lon_deg) for u in users.users])

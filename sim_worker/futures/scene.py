@@ -10,7 +10,7 @@ import numpy as np
 
 from foretwin.contracts.arrays import Array, Flags
 from foretwin.contracts.errors import UserError
-from foretwin.contracts.futures import Future, Job
+from foretwin.contracts.futures import CAR_WITHIN_M, Future, Job
 from foretwin.contracts.numbers import Quantity
 from foretwin.contracts.scenario import Scenario
 from foretwin.contracts.vehicle import VehicleParameters
@@ -37,9 +37,6 @@ from foretwin.sim_worker.scenarios.roles import StagedCase
 from foretwin.sim_worker.scenarios.seen import SeenActors
 from foretwin.sim_worker.scenarios.staged import staged_players, staged_start
 from foretwin.sim_worker.vehicle.seeding import local_state
-
-_CAR_WITHIN_M = 60.0
-"""The car is looked for on this much of the path's beginning."""
 
 _PERCEPTION: tuple[Quantity, ...] = (
     "perception.delay_s", "perception.lost_from_s", "perception.lost_for_s",
@@ -139,7 +136,7 @@ class SceneMaker:
                 starts[row] = staged_start(case, vehicle)
         else:
             starts = np.array(job.starts, dtype=np.float64)
-        place = path.locate(starts[:, :2], upto_arc_m=_CAR_WITHIN_M)
+        place = path.locate(starts[:, :2], upto_arc_m=CAR_WITHIN_M)
         if staged and start_arc_m is None:
             start_arc_m = place.arc_m
             for row, case in cases.items():

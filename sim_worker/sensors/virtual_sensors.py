@@ -16,6 +16,7 @@ from foretwin.contracts.point_cloud import PointCloud
 from foretwin.contracts.radar_list import RadarList
 from foretwin.contracts.sensed_motion import SensedFix, SensedImu
 from foretwin.contracts.setup import SensorSees
+from foretwin.contracts.too_old import USERS_FOR_NS
 from foretwin.contracts.world import World
 from foretwin.sim_worker.sensors.base_motion import BaseMotion, moved
 from foretwin.sim_worker.sensors.camera import CameraWorld, message_of
@@ -29,8 +30,6 @@ from foretwin.sim_worker.sensors.radar import detect
 from foretwin.sim_worker.sensors.ray_world import RayWorld
 from foretwin.sim_worker.sensors.sensor_file import SensorFile
 
-LIVES_NS = 500_000_000
-"""A road user of whom nothing was said for so long is gone, as for the gateway."""
 _LATE_TURNS = 3
 """Who hears nothing for longer was not driving: turns of that time are not missed."""
 _LATELY = 20
@@ -119,7 +118,7 @@ class VirtualSensors:
         self._said = {
             name: one
             for name, one in self._said.items()
-            if abs(state.stamp_ns - one.stamp_ns) <= LIVES_NS
+            if abs(state.stamp_ns - one.stamp_ns) <= USERS_FOR_NS
         }
         self._states.append(state)
         for place, (sensor, sees) in enumerate(self._sensors):
@@ -209,7 +208,7 @@ class VirtualSensors:
             return abs(state.stamp_ns - cloud.stamp_ns)
 
         state = min(self._states, key=away_ns, default=None)
-        if not self._said or state is None or not state.yaw_valid or away_ns(state) > LIVES_NS:
+        if not self._said or state is None or not state.yaw_valid or away_ns(state) > USERS_FOR_NS:
             return cloud
         turn = _Turn(0, cloud.stamp_ns, state, tuple(self._said.values()))
         virtual = self._scan(self._no_world, place, turn)

@@ -12,8 +12,8 @@ from typing import Any, NamedTuple
 
 from foretwin.contracts.drive import RoadUsers, VehicleState
 from foretwin.contracts.frames import LocalFrame
+from foretwin.contracts.too_old import USERS_FOR_NS
 from foretwin.telemetry.mixed.merge import MergeRules, merge, viewpoint
-from foretwin.telemetry.ros2.virtual_objects import LIVES_NS
 from foretwin.telemetry.ros_messages.objects import ObjectSpread
 
 MOST_REAL = 512
@@ -55,7 +55,7 @@ class MergedObjects:
         """
         rules, state = self._rules, self._state
         spread = ObjectSpread(rules.position_std_m, rules.yaw_std_rad, rules.speed_std_mps)
-        knows = state is not None and abs(state.stamp_ns - real.stamp_ns) <= LIVES_NS
+        knows = state is not None and abs(state.stamp_ns - real.stamp_ns) <= USERS_FOR_NS
         if state is None or not knows or len(real.users) > MOST_REAL:
             why = "not added to a list too long" if knows else "not added without the car's place"
             self.counts[why] += len(virtual.users)

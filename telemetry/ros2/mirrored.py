@@ -11,8 +11,9 @@ import numpy as np
 from foretwin.contracts.drive import RoadUser, RoadUsers
 from foretwin.contracts.frames import LocalFrame, geo_pose
 from foretwin.contracts.simulation import MirrorSample, PlaneState
+from foretwin.contracts.too_old import USERS_FOR_NS
 from foretwin.contracts.vehicle import VehicleParameters, kind_by_length
-from foretwin.telemetry.ros2.virtual_objects import LIVES_NS, UnfitError
+from foretwin.telemetry.ros2.virtual_objects import UnfitError
 
 OWN_TWIN = "twin of the car"
 """The id of the car's own twin among road users."""
@@ -67,7 +68,7 @@ class MirroredObjects:
 
         Raises UnfitError where the mirror lags so far behind the car that it tells of the past.
         """
-        if self._now_ns is not None and self._now_ns - sample.stamp_ns > LIVES_NS:
+        if self._now_ns is not None and self._now_ns - sample.stamp_ns > USERS_FOR_NS:
             raise UnfitError("a mirror that lags behind the car")
         return RoadUsers(stamp_ns=sample.stamp_ns, users=tuple(self._there(sample)))
 

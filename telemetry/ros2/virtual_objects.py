@@ -11,13 +11,12 @@ import numpy as np
 
 from foretwin.contracts.drive import RoadUser, RoadUserKind, RoadUsers
 from foretwin.contracts.frames import GeoPoint, LocalFrame, geo_from_local
+from foretwin.contracts.too_old import USERS_FOR_NS
 from foretwin.telemetry.logs.log import is_finite
 
 _MOST_SPEED_MPS, _MOST_SIZE_M = 100.0, 50.0
 _STEP_BACK_NS = 1_000_000_000
 """A stamp that goes back so far is the vehicle's clock set anew."""
-LIVES_NS = 500_000_000
-"""A road user of which nothing was said for so long is gone."""
 
 
 class UnfitError(ValueError):
@@ -144,7 +143,7 @@ class VirtualObjects:
         return _all_at(self._fresh(now_ns), stamp_ns)
 
     def _fresh(self, now_ns: int) -> dict[str, _Latest]:
-        return {n: one for n, one in self._latest.items() if now_ns - one.heard_ns <= LIVES_NS}
+        return {n: one for n, one in self._latest.items() if now_ns - one.heard_ns <= USERS_FOR_NS}
 
 
 def _all_at(latest: dict[str, _Latest], stamp_ns: int) -> RoadUsers:

@@ -11,7 +11,8 @@ import rerun as rr
 
 from foretwin.contracts.drive import RoadUser, RoadUsers
 from foretwin.contracts.frames import GeoPoint, LocalFrame, geo_pose
-from foretwin.viewer.colours import DETECTED, SEEN_FOR_NS, VIRTUAL
+from foretwin.contracts.too_old import USERS_FOR_NS
+from foretwin.viewer.colours import DETECTED, VIRTUAL
 from foretwin.viewer.log_road_users import DETECTED_PATH, VIRTUAL_PATH, RoadUsersLog
 from foretwin.viewer.monitor import Monitor
 from tests.viewer import scene
@@ -84,5 +85,5 @@ def test_who_is_detected_is_shown_until_nothing_was_said_of_it_for_a_second() ->
         rows = monitor.handle("state", scene.state_at(after_ns * 1e-9))
         return any(r.path == DETECTED_PATH and isinstance(r.components, rr.Clear) for r in rows)
 
-    late = [SEEN_FOR_NS, SEEN_FOR_NS + 1_000_000, SEEN_FOR_NS + 2_000_000]
+    late = [USERS_FOR_NS, USERS_FOR_NS + 1_000_000, USERS_FOR_NS + 2_000_000]
     assert [taken_away(after_ns) for after_ns in late] == [False, True, False]

@@ -20,9 +20,9 @@ from foretwin.contracts.simulation import (
     WorldNotice,
 )
 from foretwin.contracts.terminal import plain
+from foretwin.contracts.too_old import USERS_FOR_NS
 from foretwin.contracts.towards_vehicle import Injection
 from foretwin.contracts.world import World
-from foretwin.viewer.colours import SEEN_FOR_NS
 from foretwin.viewer.copilot import words
 from foretwin.viewer.copilot.alerts import Alerts
 from foretwin.viewer.copilot.frame import AheadFrame, AlertFrame, DangerFrame, PageFrame, SeenFrame
@@ -237,7 +237,7 @@ class DriveNow:
 
     def _seen_now(self) -> list[SeenFrame]:
         seen, state = self._seen, self._state
-        if seen is None or state is None or state.stamp_ns - seen.stamp_ns > SEEN_FOR_NS:
+        if seen is None or state is None or state.stamp_ns - seen.stamp_ns > USERS_FOR_NS:
             return []
         users = seen.users[:MOST_SEEN]
         if not users:

@@ -11,7 +11,8 @@ import pytest
 from foretwin.contracts.drive import RoadUsers
 from foretwin.contracts.point_cloud import PointCloud
 from foretwin.contracts.radar_list import RadarList
-from foretwin.sim_worker.sensors.virtual_sensors import LIVES_NS, VirtualSensors
+from foretwin.contracts.too_old import USERS_FOR_NS
+from foretwin.sim_worker.sensors.virtual_sensors import VirtualSensors
 from tests.sim_worker.places import box, crossroads, state_at
 from tests.sim_worker.sensors.test_lidar import exact
 from tests.sim_worker.sensors.test_radar import exact as radar
@@ -58,11 +59,11 @@ def test_road_users_are_there_for_as_long_as_somebody_says_so() -> None:
     sensors = VirtualSensors([(exact(), "world")])
     sensors.use_world(TOWN)
     sensors.take_users(users(0, "van"))
-    until_ms = LIVES_NS // MS
+    until_ms = USERS_FOR_NS // MS
     clouds = driven(sensors, until_ms + 300)
     seen = [ahead_m(cloud) < 10.0 for cloud in clouds]
 
-    assert seen == [cloud.stamp_ns <= LIVES_NS for cloud in clouds]
+    assert seen == [cloud.stamp_ns <= USERS_FOR_NS for cloud in clouds]
     assert True in seen
     assert False in seen
 

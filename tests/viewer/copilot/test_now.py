@@ -12,9 +12,8 @@ from foretwin.contracts.drive import RoadUser, RoadUsers, SignalColour, SignalSt
 from foretwin.contracts.frames import GeoPoint
 from foretwin.contracts.lights import ShownLight, ShownLights, WhyShown
 from foretwin.contracts.simulation import ActiveWorld, RunEnd, WorldNotice
-from foretwin.contracts.too_old import LIGHT_FOR_S
+from foretwin.contracts.too_old import LIGHT_FOR_S, USERS_FOR_NS
 from foretwin.contracts.world import World
-from foretwin.viewer.colours import SEEN_FOR_NS
 from foretwin.viewer.copilot.frame import AheadFrame, AheadLight, PageFrame
 from foretwin.viewer.copilot.now import DriveNow
 from foretwin.viewer.copilot.words import INJECTION_FOR_S
@@ -199,7 +198,7 @@ def test_what_the_car_detects_is_shown_while_it_is_fresh() -> None:
     (seen,) = drive.frame().seen
     assert (seen.kind, seen.size) == ("bicycle", [1.8, 0.6])
     assert seen.at == pytest.approx([0.0, 0.0], abs=0.1)
-    drive.take("objects", RoadUsers(stamp_ns=stamp_ns - SEEN_FOR_NS - 1, users=(user,)))
+    drive.take("objects", RoadUsers(stamp_ns=stamp_ns - USERS_FOR_NS - 1, users=(user,)))
     assert drive.frame().seen == []
 
 
