@@ -38,7 +38,7 @@ junctions of `python -m tests.engines`."""
 MOST_TOLD = 8
 """Different reasons for no answer of which is told; each once."""
 TOLD_EVERY_S = 10.0
-"""No more often is told that engines disagree."""
+"""No more often is told that engines disagree, in drive time: in lock step no clock decides."""
 
 
 class AskedSiblings(NamedTuple):
@@ -65,7 +65,8 @@ class SiblingRounds:
         )
         self._asked: dict[str, AskedSiblings] = {}
         self._up = False
-        self._next_s, self._told_s = 0.0, -TOLD_EVERY_S
+        self._next_s = 0.0
+        self._told_ns: int | None = None
         self._life_cpu_s = 0.0
         self._failures: set[str] = set()
         self.count = SiblingCount()
@@ -164,7 +165,7 @@ class SiblingRounds:
         for one, row in zip(found, rows, strict=True):
             self.count.take(row)
             self._context.publish("sibling", one)
-            self._tell(one, now_s)
+            self._tell(one)
 
     def _drop(self, key: str, reason: str = "") -> None:
         if self._asked.pop(key, None) is None:
@@ -174,9 +175,11 @@ class SiblingRounds:
             self._failures.add(reason)
             self._context.tell(Notice("warning", f"{self._config.engine} beside MuJoCo: {reason}"))
 
-    def _tell(self, one: SiblingFuture, now_s: float) -> None:
-        if one.matters and now_s >= self._told_s + TOLD_EVERY_S:
-            self._told_s = now_s
+    def _tell(self, one: SiblingFuture) -> None:
+        told_ns = self._told_ns
+        lately = told_ns is not None and abs(one.stamp_ns - told_ns) < TOLD_EVERY_S * 1e9
+        if one.matters and not lately:
+            self._told_ns = one.stamp_ns
             self._context.tell(Notice("warning", disagreement_text(one)))
 
 
