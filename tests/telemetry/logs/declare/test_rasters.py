@@ -39,8 +39,8 @@ def rasters(folder: Path, *, fast: np.ndarray, slow: np.ndarray) -> Path:
 def test_rows_of_several_rates_with_a_time_each_are_refused(tmp_path: Path) -> None:
     """Read by the fast time the car would drive five times as fast."""
     times = drive_columns()["t"]
-    path = rasters(tmp_path, fast=np.arange(0.0, 150.0, 0.02), slow=times)
-    with pytest.raises(LogError, match=r"t_gps, lat, lon end at row 1500 of 7500, .* than t_can"):
+    path = rasters(tmp_path, fast=np.arange(0.0, 75.0, 0.02), slow=times)
+    with pytest.raises(LogError, match=r"t_gps, lat, lon end at row 750 of 3750, .* than t_can"):
         propose(path)
 
 
