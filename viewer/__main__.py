@@ -108,6 +108,7 @@ class Recorder:
             if setup.anchor is None
             else rows_of_lot(setup.anchor, setup.fence, drive_frame=setup.drive_frame),
             clock=None if setup.live == "none" else lambda: time.strftime("%H:%M:%S"),
+            mono_s=time.monotonic,
         )
 
     def _open_part(self) -> None:

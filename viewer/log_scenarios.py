@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 import numpy.typing as npt
 import rerun as rr
@@ -89,19 +91,28 @@ def rows_of_round(view: RoundView, drive_ns: int) -> list[Row]:
 
 
 class RoundLog:
-    """Turns rounds into rows, and takes one away that is too old, as where rounds are missed."""
+    """Turns rounds into rows, and takes one away that is too old, as where rounds are missed.
 
-    def __init__(self) -> None:
+    By `mono_s`, where there is a clock, as long must have passed: states may overtake rounds in a
+    burst, or where the viewer lags.
+    """
+
+    def __init__(self, mono_s: Callable[[], float] | None = None) -> None:
+        self._mono_s = mono_s
         self._shown_ns: int | None = None
+        self._came_s = 0.0
 
     def rows(self, view: RoundView, drive_ns: int) -> list[Row]:
         """Return the rows of a round."""
         self._shown_ns = None if view.late else drive_ns
+        self._came_s = 0.0 if self._mono_s is None else self._mono_s()
         return rows_of_round(view, drive_ns)
 
     def old(self, drive_ns: int) -> list[Row]:
         """Return what takes the round away whose state is so long ago."""
         if self._shown_ns is None or drive_ns - self._shown_ns <= ROUND_FOR_S * 1e9:
+            return []
+        if self._mono_s is not None and self._mono_s() - self._came_s <= ROUND_FOR_S:
             return []
         text = Row("scenarios/table", drive_ns, document(f"no round for {ROUND_FOR_S:.0f} s"))
         return [*self.none(drive_ns), text]

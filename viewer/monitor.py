@@ -61,6 +61,7 @@ class Monitor:
         roads: RoadsShown | None = None,
         lot: Sequence[Row] = (),
         clock: Callable[[], str] | None = None,
+        mono_s: Callable[[], float] | None = None,
     ) -> None:
         self._frame = drive_frame
         self._find_start = find_start
@@ -69,7 +70,7 @@ class Monitor:
         self._load_world, self._roads, self._lot = load_world, roads, lot
         self._drive = DriveLog(drive_frame)
         self._detected = RoadUsersLog(drive_frame, DETECTED_PATH, DETECTED)
-        self._round = log_scenarios.RoundLog()
+        self._round = log_scenarios.RoundLog(mono_s)
         self._lights = LightsLog(drive_frame)
         self._run = RunLog(title, attribution, clock)
         self._tuning = TuningLog()

@@ -11,13 +11,16 @@ from foretwin.viewer.rows import Row
 from tests.viewer import scene
 
 
-def monitor_of(load_world: Any = lambda _id: scene.junction(), lot: Sequence[Row] = ()) -> Monitor:
+def monitor_of(
+    load_world: Any = lambda _id: scene.junction(), lot: Sequence[Row] = (), **settings: Any
+) -> Monitor:
     return Monitor(
         drive_frame=scene.DRIVE_FRAME,
         find_start=lambda _first: scene.START_NS,
         title="t",
         load_world=load_world,
         lot=lot,
+        **settings,
     )
 
 

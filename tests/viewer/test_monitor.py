@@ -22,7 +22,6 @@ from foretwin.contracts.simulation import (
     WorldNotice,
 )
 from foretwin.contracts.world import World
-from foretwin.viewer.danger import ROUND_FOR_S
 from foretwin.viewer.live_viewer import NoViewerError, live_viewer
 from foretwin.viewer.log_scenarios import (
     CRITICAL,
@@ -40,7 +39,6 @@ from tests.viewer.shown import Shown, monitor_of, text_of
 COVERS = (
     "foretwin.viewer.log_drive",
     "foretwin.viewer.log_run",
-    "foretwin.viewer.log_scenarios",
 )
 
 
@@ -92,21 +90,6 @@ def test_open_ground_takes_the_futures_away() -> None:
     rows = monitor_of().handle("active_world", ActiveWorld(stamp_ns=scene.START_NS, world_id=None))
     assert [row.path for row in rows] == ["world/futures"]
     assert rows[0].components.is_recursive.as_arrow_array().to_pylist() == [True]  # type: ignore[attr-defined]
-
-
-def test_a_round_that_no_other_follows_is_taken_away() -> None:
-    monitor = monitor_of()
-    monitor.handle("round", scene.round_at(1.0))
-    kept = Shown(monitor.handle("state", scene.state_at(1.0 + ROUND_FOR_S)))
-    assert "world/futures" not in kept.paths
-    gone = Shown(monitor.handle("state", scene.state_at(1.1 + ROUND_FOR_S)))
-    assert gone["world/futures"].is_recursive.as_arrow_array().to_pylist() == [True]
-    assert text_of(gone["scenarios/table"]) == "no round for 3 s"
-    once = Shown(monitor.handle("state", scene.state_at(1.2 + ROUND_FOR_S)))
-    assert "world/futures" not in once.paths
-    monitor.handle("round", scene.round_at(5.0))
-    monitor.handle("active_world", ActiveWorld(stamp_ns=scene.START_NS, world_id=None))
-    assert "world/futures" not in Shown(monitor.handle("state", scene.state_at(9.0))).paths
 
 
 def test_a_world_is_read_once() -> None:
