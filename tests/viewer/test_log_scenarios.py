@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from msgspec.structs import replace
+
 from foretwin.contracts.simulation import ActiveWorld
 from foretwin.viewer.danger import ROUND_FOR_S
 from tests.viewer import scene
@@ -21,6 +23,14 @@ def test_a_round_that_no_other_follows_is_taken_away() -> None:
     monitor.handle("round", scene.round_at(5.0))
     monitor.handle("active_world", ActiveWorld(stamp_ns=scene.START_NS, world_id=None))
     assert "world/futures" not in Shown(monitor.handle("state", scene.state_at(9.0))).paths
+
+
+def test_what_is_said_of_a_late_round_stays_until_the_next() -> None:
+    monitor = monitor_of()
+    monitor.handle("round", scene.round_at(1.0))
+    monitor.handle("round", replace(scene.round_at(1.5), late=True))
+    later = Shown(monitor.handle("state", scene.state_at(9.0)))
+    assert not {"world/futures", "scenarios/table"} & set(later.paths)
 
 
 def test_states_that_overtake_rounds_in_a_burst_take_none_away() -> None:

@@ -10,6 +10,7 @@ from msgspec.structs import replace
 
 from foretwin.contracts.anchor import Anchor, AnchorPose
 from foretwin.contracts.arrays import Array32
+from foretwin.contracts.bounds import MOST_ROS_BYTES
 from foretwin.contracts.bus import Mailbox
 from foretwin.contracts.point_cloud import Mount, PointCloud, mount_from_base_cloud
 from foretwin.telemetry.ros2.gateway import Gateway
@@ -116,6 +117,16 @@ def test_a_real_cloud_comes_in_base_link() -> None:
         cloud = item.message()
         assert cloud.points == pytest.approx(POINTS, abs=1e-5)
         assert (cloud.stamp_ns, cloud.sensor) == (stamp_ns, "top")
+
+
+def test_a_cloud_may_be_larger_than_other_messages() -> None:
+    ground = Passing()
+    points = np.tile(POINTS, (120_000, 1))
+    assert points.nbytes > MOST_ROS_BYTES
+    ground.hears(points, frame="base_link")
+    item = ground.real.take()
+    assert item is not None
+    assert len(item.message().points) == len(points)
 
 
 def test_a_car_on_a_small_mirrored_lot_has_small_mirrored_clouds() -> None:
