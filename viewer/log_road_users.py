@@ -49,7 +49,7 @@ class RoadUsersLog:
         return [Row(self._path, drive_ns, boxes)]
 
     def old(self, drive_ns: int) -> list[Row]:
-        """Return what takes those away of whom nothing was told for a second."""
+        """Return what takes those away of whom nothing was told for `USERS_FOR_NS`."""
         if self._last_ns is None or drive_ns - self._last_ns <= USERS_FOR_NS:
             return []
         return self._none(drive_ns)

@@ -67,7 +67,7 @@ def test_they_are_drawn_ten_times_a_second_and_taken_away_at_once() -> None:
     assert log.rows(users((1.0, 2.0, 0.0)), 270_000_000)
 
 
-def test_who_is_detected_is_shown_until_nothing_was_said_of_it_for_a_second() -> None:
+def test_who_is_detected_is_shown_until_nothing_was_said_of_it_for_half_a_second() -> None:
     monitor = Monitor(
         drive_frame=scene.DRIVE_FRAME,
         find_start=lambda _: scene.START_NS,
