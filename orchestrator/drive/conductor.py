@@ -293,7 +293,7 @@ class Conductor:
         if process_id in self.alive:
             del self.alive[process_id]
             self.tuning.process_down(process_id)
-            log.info("lost %s", process_id)
+            log.info("%s has left the bus", process_id)
             self.rounds.siblings.process_down(process_id)
             if process_id.startswith("w"):
                 self.worlds.worker_down(process_id)
