@@ -17,6 +17,7 @@ from functools import cache
 from pathlib import Path
 from typing import Literal
 
+from tests.mutation.users import users_of
 from tests.test_layout import ROOT
 from tests.test_mirrored import covered, mirror_of, mirrored, modules
 
@@ -82,11 +83,18 @@ class Checkout:
     def fate(self, module: str, text: str, *, system: bool = False) -> Fate:
         """Put a text in a module's place, run its tests, and put back what was there.
 
-        Raises RuntimeError where the tests fail unchanged.
+        Where they notice nothing, those of the modules that use what was changed. Raises
+        RuntimeError where the tests fail unchanged.
         """
         tests = tuple(files_of(module, system=system))
-        if not tests:
-            return "untested"
+        told = self._fate_by(tests, module, text) if tests else "untested"
+        if told in ("survived", "untested"):
+            others = [name for user in users_of(module, text) for name in files_of(user)]
+            further = tuple(name for name in dict.fromkeys(others) if name not in tests)
+            told = self._fate_by(further, module, text) if further else told
+        return told
+
+    def _fate_by(self, tests: tuple[str, ...], module: str, text: str) -> Fate:
         for test in tests:
             if test not in self._taken_s:
                 self._measure(test)
