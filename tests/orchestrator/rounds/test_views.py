@@ -183,6 +183,12 @@ def test_met_is_whose_outline_comes_nearest() -> None:
     assert (view.met[0].future, view.met[0].kind) == (1, "truck")
 
 
+def test_whom_the_car_leaves_behind_is_met_at_the_first_instant() -> None:
+    done = meeting((-5.0, 1.0))
+    view = round_view(done, round_futures(done).futures, WORLD, CAR, WORLD.frame)
+    assert [(one.future, one.time_s) for one in view.met] == [(1, 0.0), (2, 4.0)]
+
+
 def test_who_is_near_as_a_wall_is_hit_is_met_and_not_touched() -> None:
     done = meeting((40.0, 2.0), (30.0, 60.0))
     done.results[0].outcome.collision_with[2] = 2
