@@ -60,6 +60,13 @@ def test_a_key_stands_on_its_line(place: Place, line: int) -> None:
     assert lines_of(TEXT)[place] == line
 
 
+@pytest.mark.parametrize("quotes", [3, 4, 5])
+def test_a_text_may_end_in_quotes_of_its_own(quotes: int) -> None:
+    text = f'a = ["""b{quotes * chr(34)}]\nc = 1'
+    assert tomllib.loads(text)["c"] == 1
+    assert lines_of(text)[("c",)] == 2
+
+
 def test_what_is_not_there_is_sought_around_it() -> None:
     lines = lines_of(TEXT)
     assert line_at(lines, ("v", 1, "missing")) == 14
