@@ -19,12 +19,14 @@ _OUT_ROWS = REAL[:, ::1]
 
 
 @kernel(
-    WHOLE, types.UniTuple(_ALL, 5), _SIZES, _ROWS, types.UniTuple(REAL, 5), WHOLE[::1], _OUT_ROWS
-)
+    WHOLE, types.UniTuple(_ALL, 5), _SIZES, _ROWS, _ROWS, types.UniTuple(REAL, 5), WHOLE[::1],
+    _OUT_ROWS,
+)  # fmt: skip
 def find_leaders(
     relative: tuple[Array, ...],
     other_half_m: tuple[Array, Array],
     curvature_pm: Array,
+    towards: Array,
     limits: tuple[float, ...],
     pair: Indices,
     found: Array,
@@ -32,30 +34,33 @@ def find_leaders(
     """Return how many (K) are ahead on the ego's course, as `following.leaders` defines it.
 
     `relative` holds (S, N, R) each: ahead, left, cos, sin and speed; half sizes (S, 1, R);
-    `curvature_pm` (S, N). The first K of `pair` are filled with their flat indices, and the
-    first K columns of `found` (5, …) with gap, left, reach, and cosine and sine against the course.
+    `curvature_pm` (S, N); `towards` (S, N) is 1 where the ego drives forwards, and -1 where it
+    backs, which turns its axes round. The first K of `pair` are filled with their flat indices, and
+    the first K columns of `found` (5, …) with gap, left, reach, and cosine and sine against the
+    course.
     """
     ahead_m, left_m, cos, sin, speed_mps = relative
     centre_ahead, length, width, along_cos, stands_mps = limits
     half_length_m, half_width_m = other_half_m
     futures, instants, users = ahead_m.shape
-    front, count = centre_ahead + length, 0
+    count = 0
     for future in range(futures):
         for instant in range(instants):
-            kappa = curvature_pm[future, instant]
+            kappa, way = curvature_pm[future, instant], towards[future, instant]
+            front = way * centre_ahead + length
             for user in range(users):
-                ahead, y = ahead_m[future, instant, user], left_m[future, instant, user]
+                ahead, y = way * ahead_m[future, instant, user], way * left_m[future, instant, user]
                 inward = 1.0 - kappa * y
                 if not (ahead > 0.0 and inward > 0.0):
                     continue
                 a, b = half_length_m[future, 0, user], half_width_m[future, 0, user]
-                x = ahead + centre_ahead
+                x = ahead + way * centre_ahead
                 across = kappa * x
                 radius = math.sqrt(across * across + inward * inward)
                 left = (2.0 * y - kappa * (x * x + y * y)) / (1.0 + radius)
                 if not abs(left) < width + a + b:
                     continue
-                c, s = cos[future, instant, user], sin[future, instant, user]
+                c, s = way * cos[future, instant, user], way * sin[future, instant, user]
                 turned_cos = (c * inward + s * across) / radius
                 turned_sin = (s * inward - c * across) / radius
                 reach = width + a * abs(turned_sin) + b * abs(turned_cos)

@@ -1,8 +1,9 @@
 """Road users ahead on the ego's course: headway, and what avoiding them would take.
 
-The course is the circle of the ego's present yaw rate and speed. Ahead on it are those that overlap
-the strip that the ego would sweep, not driven against it or across it. What avoiding them takes is
-asked while there is a gap: once outlines touch, nothing avoids it any more.
+The course is the circle of the ego's present yaw rate and speed; of one that backs, the rear is its
+front. Ahead on it are those that overlap the strip that the ego would sweep, not driven against it
+or across it. What avoiding them takes is asked while there is a gap: once outlines touch, nothing
+avoids it any more.
 """
 
 from __future__ import annotations
@@ -96,10 +97,12 @@ def leaders(view: RolloutView) -> Leaders:
     """Return all road users ahead on the ego's course at some instant.
 
     With κ the curvature, a point at (x, y) of base_link's axes lies ((1 - r) / κ) to the left of
-    the circle and atan2(κ x, 1 - κ y) / κ along it, where r² = (κ x)² + (1 - κ y)².
+    the circle and atan2(κ x, 1 - κ y) / κ along it, where r² = (κ x)² + (1 - κ y)². Axes of an ego
+    that backs are turned round.
     """
     seen = view.relative
-    speed = view.states[..., 3]
+    towards = np.where(view.backs, -1.0, 1.0)
+    speed = towards * view.states[..., 3]
     curvature = np.where(
         np.abs(speed) > _SLOW_MPS, view.states[..., 5] / np.maximum(np.abs(speed), _SLOW_MPS), 0.0
     )
@@ -108,7 +111,9 @@ def leaders(view: RolloutView) -> Leaders:
     found = np.empty((5, len(pairs)))
     limits = (view.centre_ahead_m, *view.half_m, ALONG_COS, STANDING_MPS)
     relative = (*seen[:4], seen.speed_mps)
-    count = compiled_pairs.find_leaders(relative, view.user_half_m, curvature, limits, pairs, found)
+    count = compiled_pairs.find_leaders(
+        relative, view.user_half_m, curvature, towards, limits, pairs, found
+    )
     pair = pairs[:count]
     gap, left, reach, turned_cos, turned_sin = found[:, :count]
     row, user = np.divmod(pair, max(seen.ahead_m.shape[2], 1))

@@ -49,25 +49,29 @@ def scene(seed: int, *, bends: bool = True) -> RolloutView:
 @drawn
 @given(seeds)
 def test_leaders_are_those_within_reach_of_the_circle(seed: int) -> None:
-    """Polar coordinates about the circle's centre, or straight ahead, instead of the formulas."""
+    """Polar coordinates about the circle's centre, or straight ahead, instead of the formulas.
+
+    Who backs is looked at from behind: its axes are turned round.
+    """
     driven = scene(seed)
+    way = np.where(driven.states[..., 3:4] < -0.05, -1.0, 1.0)
     seen, (half_length, half_width) = driven.relative, driven.user_half_m
     found = following.leaders(driven)
     speed, rate = driven.states[..., 3:4], driven.states[..., 5:6]
     bends = (np.abs(speed) > 1.0) & (rate != 0.0)
     radius = np.where(bends, np.abs(speed) / np.where(bends, rate, 1.0), 1.0)
     radius = np.copysign(np.maximum(np.abs(radius), 4.0), radius)
-    x, y = seen.ahead_m + driven.centre_ahead_m, seen.left_m
+    x, y = way * (seen.ahead_m + driven.centre_ahead_m), way * seen.left_m
     side = np.sign(radius)
     left = np.where(bends, side * (np.abs(radius) - np.hypot(x, y - radius)), y)
     turn = np.where(bends, np.arctan2(x, side * (radius - y)), 0.0)
     along = np.where(bends, np.abs(radius) * turn, x)
-    angle = np.arctan2(seen.sin, seen.cos) - side * turn
+    angle = np.arctan2(way * seen.sin, way * seen.cos) - side * turn
     lengthways = half_length * np.abs(np.cos(angle)) + half_width * np.abs(np.sin(angle))
     across = half_length * np.abs(np.sin(angle)) + half_width * np.abs(np.cos(angle))
-    front = driven.centre_ahead_m + driven.half_length_m
+    front = way * driven.centre_ahead_m + driven.half_length_m
     reach = driven.half_width_m + across
-    ahead = (seen.ahead_m > 0.0) & (np.abs(turn) < np.pi / 2) & (along > front)
+    ahead = (way * seen.ahead_m > 0.0) & (np.abs(turn) < np.pi / 2) & (along > front)
     ahead &= (np.abs(left) < reach) & ((np.cos(angle) >= 0.5) | (np.abs(seen.speed_mps) < 0.5))
 
     pair = np.flatnonzero(ahead)

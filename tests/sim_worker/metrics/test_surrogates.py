@@ -209,6 +209,25 @@ def test_a_leader_in_a_bend_is_found_along_the_bend() -> None:
     assert value(driven, "thw") == pytest.approx((radius * 1.0 - front - 2.0) / speed, abs=1e-6)
 
 
+@pytest.mark.parametrize("rate_radps", [1e-4, 0.4, -0.4])
+def test_who_backs_is_led_by_who_stands_behind_it(rate_radps: float) -> None:
+    """As the car that drives the same circle forwards, with its rear overhang for a front."""
+    time_s, speed, ahead_m = times(0.5), 2.0, 6.0
+    rear_m = VEHICLE.rear_overhang_m.value
+    driven = rollout(Mover(0, 0, 0, 0), Mover(0, 0, 0, 0), Mover(8, 0, 0, 0), time_s=time_s)
+    radius = speed / rate_radps
+    angle = np.append(speed * time_s, ahead_m) / radius
+    circle = np.column_stack([radius * np.sin(angle), radius * (1 - np.cos(angle)), angle])
+    driven.states[0, :, :3] = np.add(circle[:-1], (0.0, 0.0, math.pi))
+    driven.states[0, :, 3:6] = (-speed, 0.0, rate_radps)
+    driven.users[0, :, 0] = circle[-1]
+    driven.users[0, :, 1] = (-8.0, 0.0, 0.0)
+
+    gap_m = ahead_m - speed * time_s[-1] - rear_m - 2.0
+    assert value(driven, "thw") == pytest.approx(gap_m / speed, abs=1e-6)
+    assert value(driven, "drac") == pytest.approx(speed**2 / (2.0 * gap_m), abs=1e-6)
+
+
 def test_exposure_counts_the_time_below_the_threshold() -> None:
     driven = rollout(
         Mover(0, 0, 0, 10), Mover(12 + HALF_M, 0, 0, 5, length=4), time_s=times(1.0, 0.01)
