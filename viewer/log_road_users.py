@@ -7,14 +7,14 @@ import rerun as rr
 
 from foretwin.contracts.drive import RoadUsers
 from foretwin.contracts.frames import LocalFrame, local_from_geo, local_from_geo_yaw
+from foretwin.contracts.road_user_heights import HEIGHT_M
 from foretwin.contracts.too_old import USERS_FOR_NS
 from foretwin.viewer.colours import Colour
 from foretwin.viewer.log_drive import PERIOD_NS
 from foretwin.viewer.rows import Row
 
 DETECTED_PATH, VIRTUAL_PATH = "world/detected", "world/virtual_traffic"
-_HEIGHT_M = 1.6
-"""Of all: they do not say how high they are."""
+_ABOVE_GROUND_M = 0.05
 
 
 class RoadUsersLog:
@@ -35,12 +35,12 @@ class RoadUsersLog:
         degrees = np.array([(user.position.lat_deg, user.position.lon_deg) for user in users]).T
         xy = local_from_geo(self._frame, *degrees)
         yaw = local_from_geo_yaw(self._frame, np.array([one.yaw_rad for one in users]), *degrees)
-        size = np.array([(one.length_m, one.width_m, _HEIGHT_M) for one in users])
+        size = np.array([(one.length_m, one.width_m, HEIGHT_M[one.kind]) for one in users])
         turned = np.zeros((len(users), 4))
         turned[:, 2], turned[:, 3] = np.sin(yaw / 2.0), np.cos(yaw / 2.0)
         boxes = rr.Boxes3D(
             half_sizes=0.5 * size,
-            centers=np.column_stack([xy, np.full(len(users), 0.5 * _HEIGHT_M + 0.05)]),
+            centers=np.column_stack([xy, 0.5 * size[:, 2] + _ABOVE_GROUND_M]),
             quaternions=turned,
             colors=[self._colour],
             radii=0.04,

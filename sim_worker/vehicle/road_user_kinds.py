@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from foretwin.contracts.drive import RoadUserKind
+from foretwin.contracts.road_user_heights import HEIGHT_M
 
 _SUMO = "Eclipse SUMO 1.28, defaults of vClass"
 _TARGETS = "Euro NCAP articulated target"
@@ -31,17 +32,17 @@ class KindTraits(NamedTuple):
 
 
 _SIZES_AND_LIMITS: dict[RoadUserKind, tuple[float, ...]] = {
-    "car": (4.5, 1.8, 1.5, 1500.0, 2.6, 4.5, 9.0, 55.6),
-    "van": (6.0, 2.04, 2.6, 2800.0, 2.6, 4.5, 9.0, 44.4),
-    "lorry": (7.1, 2.4, 2.8, 9000.0, 1.3, 4.0, 7.0, 36.1),
-    "bus": (12.0, 2.5, 3.4, 12000.0, 1.2, 4.0, 7.0, 27.8),
-    "tram": (22.0, 2.4, 3.2, 37900.0, 1.0, 3.0, 7.0, 22.2),
-    "motorcycle": (2.2, 0.9, 1.5, 280.0, 6.0, 4.5, 9.0, 55.6),
-    "bicycle": (1.89, 0.5, 1.87, 95.0, 1.2, 3.0, 7.0, 8.3),
-    "pedestrian": (0.5, 0.5, 1.8, 75.0, 1.5, 2.0, 5.0, 3.0),
-    "unknown": (4.5, 1.8, 1.5, 1500.0, 2.6, 4.5, 9.0, 55.6),
+    "car": (4.5, 1.8, 1500.0, 2.6, 4.5, 9.0, 55.6),
+    "van": (6.0, 2.04, 2800.0, 2.6, 4.5, 9.0, 44.4),
+    "lorry": (7.1, 2.4, 9000.0, 1.3, 4.0, 7.0, 36.1),
+    "bus": (12.0, 2.5, 12000.0, 1.2, 4.0, 7.0, 27.8),
+    "tram": (22.0, 2.4, 37900.0, 1.0, 3.0, 7.0, 22.2),
+    "motorcycle": (2.2, 0.9, 280.0, 6.0, 4.5, 9.0, 55.6),
+    "bicycle": (1.89, 0.5, 95.0, 1.2, 3.0, 7.0, 8.3),
+    "pedestrian": (0.5, 0.5, 75.0, 1.5, 2.0, 5.0, 3.0),
+    "unknown": (4.5, 1.8, 1500.0, 2.6, 4.5, 9.0, 55.6),
 }
-"""In the order of `KindTraits`."""
+"""In the order of `KindTraits`, but for heights."""
 _SOURCES = {
     "car": f"{_SUMO} passenger; 4.5 m long, as compact cars are",
     "van": "Volkswagen Crafter, medium wheelbase, rounded and half laden; "
@@ -57,6 +58,8 @@ _SOURCES = {
     "unknown": "taken for a car: the most frequent",
 }
 KINDS: dict[RoadUserKind, KindTraits] = {
-    kind: KindTraits._make([*numbers, _SOURCES[kind], kind != "pedestrian"])
+    kind: KindTraits._make(
+        [*numbers[:2], HEIGHT_M[kind], *numbers[2:], _SOURCES[kind], kind != "pedestrian"]
+    )
     for kind, numbers in _SIZES_AND_LIMITS.items()
 }

@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from foretwin.contracts import drive
+from foretwin.contracts.road_user_heights import HEIGHT_M
 from foretwin.telemetry.ros_messages.parts import ros_message, vector_from, within_float32
 
 _TRAILER = 4
@@ -31,8 +32,6 @@ _KIND_BY_LABEL: dict[int, drive.RoadUserKind] = {
 }
 _PASSABLE = (10, 11)
 """OVER_DRIVABLE, UNDER_DRIVABLE."""
-_HEIGHT_M = {"van": 2.5, "lorry": 3.5, "bus": 3.2, "tram": 3.6, "pedestrian": 1.8, "bicycle": 1.8}
-_OTHER_HEIGHT_M = 1.6
 _BOX, _CYLINDER, _POLYGON = 0, 1, 2
 _IDS = uuid.UUID("6f2d1c1e-2f0a-5c39-9d5b-1f5f0c7a3b11")
 """Namespace of the UUIDs of ids that are none."""
@@ -81,7 +80,7 @@ def outline_of(shape: Any, *, turned_rad: float = 0.0) -> Outline:
 
 def height_m(user: drive.RoadUser) -> float:
     """Return the height that is usual for a road user's kind."""
-    return _HEIGHT_M.get(user.kind, _OTHER_HEIGHT_M)
+    return HEIGHT_M[user.kind]
 
 
 def classes_from(user: drive.RoadUser) -> list[Any]:

@@ -52,7 +52,7 @@ def test_boxes_stand_where_they_are() -> None:
     assert np.array(cells(boxes.centers))[:, :2] == pytest.approx(
         np.array([[200.0, -30.0], [0.0, 50.0]]), abs=1e-3
     )
-    assert np.array(cells(boxes.half_sizes)) == pytest.approx(np.array([[3.0, 1.0, 0.8]] * 2))
+    assert np.array(cells(boxes.half_sizes)) == pytest.approx(np.array([[3.0, 1.0, 1.3]] * 2))
     assert np.array(cells(boxes.quaternions))[:, 2] == pytest.approx(
         [0.0, math.sqrt(0.5)], abs=1e-5
     )
