@@ -12,6 +12,9 @@ LEAST_RADIUS_M = 4.0
 12 m across from kerb to kerb, as the outer front wheel goes; those of base_link some 8 m."""
 MAX_CURVATURE_PM = 1.0 / LEAST_RADIUS_M
 """1/m, the same."""
+DRIVEN_CURVATURE_PM = 0.18
+"""1/m, of base_link: as tight as ways are laid that cars are to drive along. Chosen: between
+MAX_CURVATURE_PM and this lies the steering with which who drives them comes back onto them."""
 LEAST_GRID_RADIUS_M = 0.95 * LEAST_RADIUS_M
 """The same of paths whose points lie on the millimetre grid: these bend a little more than the
 curves that they stand for."""

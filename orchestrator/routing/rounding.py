@@ -11,6 +11,7 @@ from scipy.ndimage import gaussian_filter1d, minimum_filter1d
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.frames import wrap_angle
 from foretwin.geometry.polyline import arc_lengths, interpolated, left_of, tangents
+from foretwin.geometry.steering import DRIVEN_CURVATURE_PM
 from foretwin.geometry.turn_curves import turn_curves
 
 FINE_M = 0.5
@@ -19,8 +20,6 @@ SIMPLIFY_M = 0.5
 ARC_ROOM_M = 15.0
 WIDENING_M = 3.0
 WIDENING_STEPS = 8
-MAX_CURVATURE_PM = 0.18
-"""A turning circle of 11 m, as of an ordinary car."""
 TIGHT_M = 9.0
 """At junctions in towns turns are driven wider where there is room: see `driving_path.py`.
 
@@ -160,14 +159,14 @@ def normals(points: Array) -> Array:
 
 
 def drivable(points: Array) -> Array:
-    """Widen turns that no car could steer, as far as that helps.
+    """Widen turns that are too tight to be driven along, as far as that helps.
 
     It does where short edges left no room for an arc; in the hairpin of an island drawn as a V
     it does not, and the line stays as it was drawn.
     """
     best, least = points, float(np.abs(curvature_pm(points)).max())
     for _ in range(WIDENING_STEPS):
-        tight = np.abs(curvature_pm(points)) > MAX_CURVATURE_PM
+        tight = np.abs(curvature_pm(points)) > DRIVEN_CURVATURE_PM
         if not tight.any():
             break
         near = gaussian_filter1d(tight.astype(np.float64), 8.0 / FINE_M, mode="nearest")

@@ -14,11 +14,11 @@ from foretwin.contracts.errors import UserError
 from foretwin.contracts.frames import GeoPoint, LocalFrame, local_from_geo
 from foretwin.geometry.polyline import arc_lengths, interpolated
 from foretwin.geometry.speed_profile import braked, speed_in_bends_mps
+from foretwin.geometry.steering import DRIVEN_CURVATURE_PM
 from foretwin.telemetry.standin.parameters import DriverParameters
 
 _SPACING_M = 0.5
 _CREEP_MPS = 1.5
-_MAX_CURVATURE_PM = 0.17
 _SMOOTHING_M = (1.0, 1.5, 2.0, 3.0, 4.0)
 
 
@@ -104,7 +104,7 @@ class DrivenPath:
             tangent = np.gradient(self.xy_m, self.s_m, axis=0)
             self.yaw_rad: Array = np.unwrap(np.arctan2(tangent[:, 1], tangent[:, 0]))
             self.curvature_pm: Array = np.gradient(self.yaw_rad, self.s_m)
-            if np.abs(self.curvature_pm).max() <= _MAX_CURVATURE_PM:
+            if np.abs(self.curvature_pm).max() <= DRIVEN_CURVATURE_PM:
                 break
         self.length_m = float(self.s_m[-1])
         self.altitude_m: Array | None = None

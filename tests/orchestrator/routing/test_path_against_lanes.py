@@ -8,7 +8,8 @@ import msgspec
 import numpy as np
 import pytest
 
-from foretwin.orchestrator.routing.rounding import MAX_CURVATURE_PM, curvature_pm
+from foretwin.geometry.steering import DRIVEN_CURVATURE_PM
+from foretwin.orchestrator.routing.rounding import curvature_pm
 from tests.orchestrator.in_process_drive import LockStep, Round
 from tests.orchestrator.routing.path_against_lanes import DRIVES, FAR_M, config_of, shares
 
@@ -43,4 +44,4 @@ def test_rounds_on_streets_closed_since_are_counted(rounds: list[Round]) -> None
 def test_every_path_can_be_steered(rounds: list[Round]) -> None:
     worst = [np.abs(curvature_pm(one.intent.path.xy_m)).max() for one in rounds]
 
-    assert max(worst) < MAX_CURVATURE_PM
+    assert max(worst) < DRIVEN_CURVATURE_PM
