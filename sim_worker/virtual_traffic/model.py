@@ -32,14 +32,10 @@ from foretwin.sim_worker.vehicle.reference_points import box_centre_from_base_m
 from foretwin.sim_worker.vehicle.road_user_kinds import KINDS
 from foretwin.sim_worker.virtual_traffic.apart import who_must_brake
 from foretwin.sim_worker.virtual_traffic.rider import Rider, RoadsInForce
-from foretwin.sim_worker.virtual_traffic.source import STEP_S, VirtualUser
+from foretwin.sim_worker.virtual_traffic.source import FIRST_M, STEP_S, UNSEEN_M, VirtualUser
 
-UNSEEN_M = 100.0
-"""From the car: nearer than this nobody comes or goes. Chosen: 7 s at 50 km/h."""
 GONE_M = 250.0
 """From the car: who is farther away is replaced. Chosen: Worlds reach 150 m from their junction."""
-FIRST_M = 25.0
-"""From the car, those who are there as it begins."""
 APART_M = 25.0
 """From others, who comes: it can stop behind them. Chosen: 14 m/s stop within it at 4 m/s²."""
 _SHORT_M, _LONG_M = 80.0, 200.0

@@ -12,6 +12,10 @@ from foretwin.contracts.world import World
 
 STEP_S = 0.05
 """Of the car's time: 20 Hz, twice as often as detected objects usually come."""
+UNSEEN_M = 100.0
+"""From the car: nearer than this nobody comes or goes. Chosen: 7 s at 50 km/h."""
+FIRST_M = 25.0
+"""From the car, those who are there as it begins."""
 
 
 class VirtualUser(NamedTuple):

@@ -27,7 +27,7 @@ from foretwin.geometry.polyline import densified
 from foretwin.sim_worker.driver_model import EMERGENCY_DECEL_MPS2
 from foretwin.sim_worker.vehicle.reference_points import box_centre_from_base_m
 from foretwin.sim_worker.vehicle.road_user_kinds import KINDS
-from foretwin.sim_worker.virtual_traffic.source import STEP_S, VirtualUser
+from foretwin.sim_worker.virtual_traffic.source import FIRST_M, STEP_S, UNSEEN_M, VirtualUser
 from foretwin.sim_worker.virtual_traffic.sumo_lights import SumoLights
 
 NEEDS_SUMO = "virtual_traffic: source sumo needs SUMO: pip install 'foretwin[sumo]'"
@@ -37,8 +37,6 @@ _CLASSES: tuple[tuple[RoadUserKind, str, float], ...] = (
     ("motorcycle", "motorcycle", 0.03),
 )  # fmt: skip
 """Kinds with SUMO's class, and their shares."""
-_UNSEEN_M, _FIRST_M = 100.0, 25.0
-"""From the car: nearer nobody comes while driving, and as it begins."""
 _DECEL_MPS2 = 4.0
 _SPEED, _PLACE, _ANGLE, _INDEX, _TYPE, _ROAD = 0x40, 0x42, 0x43, 0x69, 0x4F, 0x50
 """SUMO's numbers of what is asked of a vehicle."""
@@ -229,7 +227,7 @@ class SumoTraffic:
         there = set(sumo.vehicle.getIDList()) | set(sumo.simulation.getPendingVehicles())
         missing = self._count - len(there - {_CAR})
         away_m = np.minimum.reduceat(np.hypot(*(self._points_m - car_m).T), self._first_of)
-        fits = np.flatnonzero(self._holds & (away_m > (_FIRST_M if begins else _UNSEEN_M)))
+        fits = np.flatnonzero(self._holds & (away_m > (FIRST_M if begins else UNSEEN_M)))
         kinds, _, shares = zip(*_CLASSES, strict=True)
         for _ in range(3 * missing if begins else min(missing, 3)):
             if missing <= 0 or not len(fits):

@@ -11,8 +11,8 @@ import pytest
 from foretwin.contracts.frames import GeoPoint, LocalFrame, geo_from_local, target_from_source_m
 from foretwin.contracts.world import World
 from foretwin.sim_worker.vehicle.parameters import load_vehicle
-from foretwin.sim_worker.virtual_traffic.model import FIRST_M, GONE_M, UNSEEN_M, ModelTraffic
-from foretwin.sim_worker.virtual_traffic.source import STEP_S
+from foretwin.sim_worker.virtual_traffic.model import GONE_M, ModelTraffic
+from foretwin.sim_worker.virtual_traffic.source import FIRST_M, STEP_S, UNSEEN_M
 from tests.sim_worker.places import FRAME, crossroads
 from tests.sim_worker.virtual_traffic.motions import G_MPS2, Scene, played, still, tracks
 
