@@ -18,7 +18,12 @@ from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.contracts.world import World
 from foretwin.geometry.frenet_path import FrenetPath
 from foretwin.geometry.polyline import arc_lengths
-from foretwin.sim_worker.driver_model import BEND_DECEL_MPS2, DECIDE_EVERY_S, MAX_DECEL_MPS2
+from foretwin.sim_worker.driver_model import (
+    BEND_DECEL_MPS2,
+    DECIDE_EVERY_S,
+    MAX_DECEL_MPS2,
+    UNKNOWN_LIMIT_MPS,
+)
 from foretwin.sim_worker.road_users.cast import Player, casting
 from foretwin.sim_worker.road_users.crowd import EgoBoxes
 from foretwin.sim_worker.road_users.manners import key_of, manners
@@ -260,4 +265,7 @@ def _wants(rider: Rider) -> float:
     """Return how fast a road user drives on a free road where it is."""
     limit = float(rider.path.at_nodes(rider.path.speed_limit_mps, np.array([rider.arc_m]))[0])
     most = KINDS[rider.kind].speed_mps
-    return min(rider.limit_share * limit, most) if np.isfinite(limit) else min(8.3, most)
+    if not np.isfinite(limit):
+        return min(UNKNOWN_LIMIT_MPS, most)
+    # As those of futures: a cyclist does not drive at a share of a limit that is set for cars.
+    return min(rider.limit_share * min(limit, most), most)

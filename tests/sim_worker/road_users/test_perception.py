@@ -15,8 +15,6 @@ from foretwin.sim_worker.road_users.sight_lines import OpaqueGrid
 from foretwin.sim_worker.road_users.traffic import Traffic
 from foretwin.sim_worker.vehicle.parameters import load_vehicle
 
-COVERS = ("foretwin.sim_worker.road_users.cast",)
-
 CAR = load_vehicle()
 EGO_PATH = FrenetPath(np.array([[0.0, 0.0], [100.0, 0.0]]))
 BESIDE = FrenetPath(np.array([[0.0, 3.0], [100.0, 3.0]]))
