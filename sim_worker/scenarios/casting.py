@@ -110,7 +110,11 @@ def _cast(
         for part, ways in zip(scenario.actors, place.actor_ways, strict=True)
     )
     touched, other = _first_touched(staging, actors, meetings)
-    reason = _out_of_bounds(staging, actors, touched.time_s) or _in_the_way(staging, actors, other)
+    reason = (
+        _out_of_time(staging, meetings)
+        or _out_of_bounds(staging, actors, touched.time_s)
+        or _in_the_way(staging, actors, other)
+    )
     if reason:
         return Unplaced(place.junction_id, reason, True)
     way = place.ego
@@ -191,6 +195,24 @@ def _meets_s(staging: Staging, meetings: dict[str, PlannedMeeting]) -> float:
         if part.name in meetings:
             return (meetings[part.name].impact.ego_arc_m - staging.start_m) / staging.ego.speed_mps
     return math.nan
+
+
+def _out_of_time(staging: Staging, meetings: dict[str, PlannedMeeting]) -> str:
+    """Return who is so early or late that it has passed the place of meeting as the case begins, or
+    is not there as it ends, or nothing."""
+    end_s = staging.scenario.horizon_s
+    for part in staging.scenario.actors:
+        late_s = staging.number(part, "arrives_after_s")
+        if part.name not in meetings or late_s == 0.0:
+            continue
+        impact = meetings[part.name].impact
+        there_s = (impact.ego_arc_m - staging.start_m) / staging.ego.speed_mps + late_s
+        told = f"{part.name}, with arrives_after_s {late_s:g}, would be at the place of meeting"
+        if there_s < 0.0:
+            return f"{told} {-there_s:.1f} s before the start"
+        if there_s > end_s:
+            return f"{told} after {there_s:.1f} s, after the end at {end_s:g} s"
+    return ""
 
 
 def _in_the_way(staging: Staging, actors: tuple[StagedActor, ...], met: str) -> str:

@@ -135,6 +135,19 @@ def test_who_arrives_later_does_not_touch() -> None:
     assert moved == pytest.approx(3.0 * other.speed_mps, abs=1e-6)
 
 
+@pytest.mark.parametrize(
+    ("late_s", "told"), [(-30.0, "before the start"), (30.0, "after the end at 8 s")]
+)
+def test_who_is_not_there_while_a_case_lasts_is_refused_by_name(late_s: float, told: str) -> None:
+    scenario = catalogue()["scp"]
+    place = places(scenario, cross(), most=1).places[0]
+    values = {**draw_cases(scenario)[0], "crossing_car.arrives_after_s": late_s}
+    case = cast(scenario, values, place, vehicle=VEHICLE)
+    assert isinstance(case, Unplaced)
+    assert case.reason.startswith(f"crossing_car, with arrives_after_s {late_s:g}, would be at ")
+    assert told in case.reason
+
+
 def test_who_walks_is_hidden_by_the_van_until_late() -> None:
     """The line from the ego's nose to the walker runs through the van two seconds before."""
     scenario = catalogue()["occluded_pedestrian"]
