@@ -41,6 +41,7 @@ from foretwin.orchestrator.record.results import ResultTables
 from foretwin.orchestrator.record.run_state import LOG, RECORD, RESULTS
 from foretwin.orchestrator.routing.route_ahead import WayAhead
 from foretwin.orchestrator.runner.supervisor import fold_stderr
+from foretwin.world_gen.roads.turn_restrictions import read_turn_restrictions
 
 log = logging.getLogger(ORCHESTRATOR)
 
@@ -74,7 +75,14 @@ class Orchestrator:
         self._before = read_standing(life.standing)
         self._standing: HandingOver
         self._mission = Mission(
-            WayAhead(plan.graph, plan.junctions, plan.routes, index=plan.index, tracks=plan.tracks),
+            WayAhead(
+                plan.graph,
+                plan.junctions,
+                plan.routes,
+                index=plan.index,
+                tracks=plan.tracks,
+                restrictions=read_turn_restrictions(plan.osm, plan.graph),
+            ),
             MissionSettings(
                 radius_m=plan.config.radius_m,
                 look_ahead_s=plan.config.look_ahead_s,

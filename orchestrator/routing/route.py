@@ -14,6 +14,7 @@ from foretwin.contracts.frames import wrap_angle
 from foretwin.geometry.polyline import points_at
 from foretwin.orchestrator.routing.road_index import legality
 from foretwin.world_gen.roads.road_graph import DirectedEdge, EdgeKey, RoadGraph
+from foretwin.world_gen.roads.turn_restrictions import UNRESTRICTED, TurnRestrictions
 
 HEADING_OVER_M = 15.0
 """Headings at a node are measured over this length: nearer, maps draw junctions with kinks."""
@@ -103,15 +104,18 @@ def turn_angle(before: tuple[DirectedEdge, ...], after: DirectedEdge) -> float:
     return float(wrap_angle(leaving_heading(after) - arriving_heading(before)))
 
 
-def most_probable_next(graph: RoadGraph, before: tuple[DirectedEdge, ...]) -> DirectedEdge | None:
+def most_probable_next(
+    graph: RoadGraph, before: tuple[DirectedEdge, ...], restrictions: TurnRestrictions
+) -> DirectedEdge | None:
     """Return the edge a car most probably takes next, None at a dead end; never a U-turn.
 
     Straightest first; another name, another class and ground where cars may not drive count as
     further degrees of turn, so that they are taken where nothing better leads on (a recorded
-    drive may be older than the map). One-way streets are not entered the wrong way.
+    drive may be older than the map), and so are turns that a restriction forbids. One-way streets
+    are not entered the wrong way.
     """
     last = before[-1]
-    best: tuple[float, int] | None = None
+    best: tuple[bool, float, int] | None = None
     choice: DirectedEdge | None = None
     for option in graph.at_node(last.end_node):
         if option.edge.index == last.edge.index or legality(option) == "against_one_way":
@@ -124,7 +128,9 @@ def most_probable_next(graph: RoadGraph, before: tuple[DirectedEdge, ...]) -> Di
             degrees += 60.0
         if degrees > 60.0 + 150.0:
             continue
-        rank = (degrees, option.edge.index)
+        allowed = restrictions.step_allowed(last, option)
+        allowed = allowed and restrictions.path_allowed((*before, option))
+        rank = (not allowed, degrees, option.edge.index)
         if best is None or rank < best:
             best, choice = rank, option
     return choice
@@ -134,7 +140,13 @@ def _rank(directed: DirectedEdge) -> int:
     return _CLASS_RANK.get(directed.edge.road_class.removesuffix("_link"), 6)
 
 
-def extend_most_probable(graph: RoadGraph, route: Route, *, until_m: float) -> Route:
+def extend_most_probable(
+    graph: RoadGraph,
+    route: Route,
+    *,
+    until_m: float,
+    restrictions: TurnRestrictions = UNRESTRICTED,
+) -> Route:
     """Return `route` continued by the most probable roads until its end lies at `until_m`.
 
     It ends earlier at a dead end, at the map's edge, or where it would drive the same road a
@@ -144,7 +156,7 @@ def extend_most_probable(graph: RoadGraph, route: Route, *, until_m: float) -> R
     end_m = route.end_m
     driven: dict[EdgeKey, int] = {}
     while end_m < until_m:
-        following = most_probable_next(graph, tuple(edges[-4:]))
+        following = most_probable_next(graph, tuple(edges[-4:]), restrictions)
         if following is None:
             break
         key = following.key

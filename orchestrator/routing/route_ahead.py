@@ -37,6 +37,7 @@ from foretwin.orchestrator.routing.world_lanes import WorldLanes, inside
 from foretwin.telemetry.estimator.map_aid import RoadLine
 from foretwin.world_gen.junctions.intersections import Junction
 from foretwin.world_gen.roads.road_graph import RoadGraph
+from foretwin.world_gen.roads.turn_restrictions import UNRESTRICTED, TurnRestrictions
 
 FAR_AHEAD_M = 3000.0
 ALTERNATIVES_M = 300.0
@@ -56,12 +57,16 @@ class WayAhead:
         *,
         index: RoadIndex | None = None,
         tracks: Sequence[DrivenTrack] = (),
+        restrictions: TurnRestrictions = UNRESTRICTED,
     ) -> None:
-        """`tracks` are of earlier drives, whose speeds the nominal future then heeds."""
+        """`tracks` are of earlier drives, whose speeds the nominal future then heeds;
+        `restrictions` are those that a way without a route keeps to."""
         index = index or RoadIndex(graph)
         self._graph = graph
         self._matcher = MapMatcher(graph, index=index)
-        self._follower = RouteFollower(graph, junctions, routes, index=index)
+        self._follower = RouteFollower(
+            graph, junctions, routes, index=index, restrictions=restrictions
+        )
         self._lines = RoadLines(graph)
         self._pace = DrivingPace()
         self._cruise = CruiseSpeed()

@@ -20,6 +20,7 @@ from foretwin.orchestrator.routing.route import Route, extend_most_probable
 from foretwin.orchestrator.routing.turning import TURNING_RAD, route_with_turn, turns_back
 from foretwin.world_gen.junctions.intersections import Junction
 from foretwin.world_gen.roads.road_graph import DirectedEdge, RoadGraph
+from foretwin.world_gen.roads.turn_restrictions import UNRESTRICTED, TurnRestrictions
 
 BEHIND_M = 150.0
 """Of the road already driven, what a route keeps."""
@@ -57,8 +58,9 @@ class RouteFollower:
         given: Sequence[Route] = (),
         *,
         index: RoadIndex | None = None,
+        restrictions: TurnRestrictions = UNRESTRICTED,
     ) -> None:
-        self._graph = graph
+        self._graph, self._restrictions = graph, restrictions
         self._index = index or RoadIndex(graph)
         self._junction_at = {node: junction for junction in junctions for node in junction.nodes}
         self._other_turns = OtherTurns(graph, self._junction_at)
@@ -257,8 +259,14 @@ class RouteFollower:
     # --- what lies ahead --------------------------------------------------------------------
 
     def _set_route(self, route: Route) -> None:
-        self._route = extend_most_probable(self._graph, route, until_m=self._s_m + AHEAD_M + 200.0)
+        self._route = self._extended(route)
         self._encounters = tuple(encounters(self._route, self._junction_at))
+
+    def _extended(self, route: Route) -> Route:
+        until_m = self._s_m + AHEAD_M + 200.0
+        return extend_most_probable(
+            self._graph, route, until_m=until_m, restrictions=self._restrictions
+        )
 
     def _extend(self) -> None:
         """Keep enough road ahead and little behind; neither changes what is already foreseen."""
@@ -268,7 +276,7 @@ class RouteFollower:
         drop = min(drop, self._place)
         grown = route
         if route.end_m < self._s_m + AHEAD_M:
-            grown = extend_most_probable(self._graph, route, until_m=self._s_m + AHEAD_M + 200.0)
+            grown = self._extended(route)
         if drop:
             grown = Route(grown.edges[drop:], float(grown.start_m[drop]))
             self._place -= drop

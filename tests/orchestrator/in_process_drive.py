@@ -30,6 +30,7 @@ from foretwin.telemetry.estimator.estimator import StateEstimator
 from foretwin.telemetry.logs.opening import open_log
 from foretwin.world_gen.build import build_world
 from foretwin.world_gen.junctions.map_index import index_map
+from foretwin.world_gen.roads.turn_restrictions import read_turn_restrictions
 
 
 class Round(NamedTuple):
@@ -96,6 +97,7 @@ class LockStep:
                 inputs.routes,
                 index=inputs.index,
                 tracks=inputs.tracks,
+                restrictions=read_turn_restrictions(inputs.osm, inputs.graph),
             ),
             MissionSettings(
                 radius_m=config.radius_m,

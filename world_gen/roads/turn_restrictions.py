@@ -77,6 +77,10 @@ class TurnRestrictions(msgspec.Struct, frozen=True):
         return True
 
 
+UNRESTRICTED = TurnRestrictions({}, ())
+"""Those of a map without any."""
+
+
 def read_turn_restrictions(osm: OsmMap, graph: RoadGraph) -> TurnRestrictions:
     """Return the map's restrictions that hold for cars at all times."""
     impossible: list[TurnRule] = []

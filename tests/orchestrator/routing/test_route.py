@@ -4,6 +4,7 @@ import pytest
 
 from foretwin.orchestrator.routing.route import Route, RouteError, extend_most_probable, turn_angle
 from foretwin.world_gen.roads.road_graph import DirectedEdge
+from foretwin.world_gen.roads.turn_restrictions import TurnRestrictions, TurnRule
 from tests.orchestrator.grid_map import graph_of, grid, road
 
 TOWN = grid(4, 3)
@@ -74,6 +75,40 @@ def test_a_car_road_to_the_side_beats_a_slight_bend_into_a_pedestrian_street() -
     route = Route((DirectedEdge(fork.edges[0], False),))
 
     assert keys(extend_most_probable(fork, route, until_m=150.0))[1] == (2, False)
+
+
+def test_a_restriction_is_kept_to_where_another_way_leads_on() -> None:
+    not_ahead = TurnRule(1, 1000, (), frozenset({1001}), only=False, u_turn=False)
+    crossing = graph_of(
+        [
+            road(0, 1, 2, [(0, 0), (100, 0)]),
+            road(1, 2, 3, [(100, 0), (200, 0)]),
+            road(2, 2, 4, [(100, 0), (100, 100)]),
+        ]
+    )
+    at_node = TurnRestrictions({2: (not_ahead,)}, ())
+    over_ways = TurnRestrictions({}, (not_ahead._replace(from_way=1003, via_ways=(1000,)),))
+    before = DirectedEdge(road(3, 5, 1, [(-50, 0), (0, 0)]), False)
+
+    def taken(route: Route, restrictions: TurnRestrictions) -> tuple[int, bool]:
+        until_m = route.end_m + 50.0
+        found = extend_most_probable(crossing, route, until_m=until_m, restrictions=restrictions)
+        return keys(found)[-1]
+
+    from_west = Route((DirectedEdge(crossing.edges[0], False),))
+    from_far = Route((before, *from_west.edges))
+    assert taken(from_west, at_node) == taken(from_far, over_ways) == (2, False)
+    assert taken(from_west, over_ways) == (1, False)
+
+
+def test_a_restriction_ends_no_way_that_has_no_other() -> None:
+    not_ahead = TurnRule(1, 1000, (), frozenset({1001}), only=False, u_turn=False)
+    lane = graph_of([road(0, 1, 2, [(0, 0), (80, 0)]), road(1, 2, 3, [(80, 0), (160, 0)])])
+    route = Route((DirectedEdge(lane.edges[0], False),))
+
+    restrictions = TurnRestrictions({2: (not_ahead,)}, ())
+    found = extend_most_probable(lane, route, until_m=150.0, restrictions=restrictions)
+    assert keys(found) == [(0, False), (1, False)]
 
 
 def test_a_pedestrian_street_straight_on_is_taken_where_nothing_else_leads_on() -> None:

@@ -17,6 +17,7 @@ from foretwin.orchestrator.routing.route import Route
 from foretwin.orchestrator.routing.route_ahead import MIN_PATH_M, WayAhead
 from foretwin.orchestrator.routing.speed_ahead import MOST_BEND_MPS2, USUAL_BEND_MPS2
 from foretwin.world_gen.roads.road_graph import DirectedEdge
+from foretwin.world_gen.roads.turn_restrictions import TurnRestrictions, TurnRule
 from tests.orchestrator.grid_map import FRAME, drive, graph_of, grid, junctions, road
 from tests.orchestrator.routing.path_against_lanes import LanesOfWorld
 from tests.orchestrator.trip import (
@@ -54,6 +55,17 @@ def test_a_street_closed_to_cars_is_told_while_the_car_is_on_it() -> None:
         told.append(way.closed_to_cars)
     changes = np.flatnonzero(np.diff(told)) * 1.0  # at 10 m/s and 10 Hz a metre each
     assert changes == pytest.approx([90.0, 190.0], abs=8.0)
+
+
+def test_the_way_that_is_predicted_keeps_to_turn_restrictions() -> None:
+    second, north = GRID.edges[5], GRID.edges[20]
+    only_left = TurnRule(1, GRID.edges[4].way_id, (), frozenset({north.way_id}), True, False)
+    rules = TurnRestrictions({second.start_node: (only_left,)}, ())
+    way = WayAhead(GRID, CORNERS, (), restrictions=rules)
+    for state in states_along(FRAME, drive([(20, 100), (60, 100)])):
+        way.locate(state)
+
+    assert [ahead.junction.summary.id for ahead in way.junctions][:3] == ["n102", "n202", "n302"]
 
 
 def test_junctions_come_in_order_with_distance_and_time() -> None:
