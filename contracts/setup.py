@@ -187,7 +187,8 @@ class TuningSetup(ProcessSetup, frozen=True, kw_only=True, forbid_unknown_fields
 class BuilderSetup(ProcessSetup, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """Builds Worlds from one map into one folder, through a cache shared between runs.
 
-    `added_roads` are indices of edges that count as car roads though the map does not say so.
+    `added_roads` are indices of edges that count as car roads though the map does not say so,
+    `driven_edges` those of the route, each with whether it is driven in reverse.
     """
 
     map: str
@@ -195,6 +196,7 @@ class BuilderSetup(ProcessSetup, frozen=True, kw_only=True, forbid_unknown_field
     """Of a large map, what lies within `margin_m` of this line of degrees; empty: all of it."""
     margin_m: float = 0.0
     added_roads: tuple[int, ...] = ()
+    driven_edges: tuple[tuple[int, bool], ...] = ()
     dem: str | None = None
     """Heights of the ground."""
     tracks: str | None = None

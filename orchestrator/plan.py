@@ -35,7 +35,7 @@ from foretwin.telemetry.ros2.mapping import MappingFile
 from foretwin.world_gen.junctions.intersections import Junction
 from foretwin.world_gen.opening import Clip
 from foretwin.world_gen.osm.osm_map import OsmMap
-from foretwin.world_gen.roads.road_graph import RoadGraph
+from foretwin.world_gen.roads.road_graph import EdgeKey, RoadGraph
 
 
 class OtherVehiclePlan(NamedTuple):
@@ -66,6 +66,8 @@ class DriveInputs:
     junctions: tuple[Junction, ...]
     added_roads: tuple[int, ...]
     """Indices of service roads that count as car roads in this drive."""
+    driven_edges: tuple[EdgeKey, ...]
+    """Those of the routes, which tell which way round tidal roads are driven."""
     routes: tuple[Route, ...]
     route_source: str
     drive_frame: LocalFrame

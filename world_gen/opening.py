@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import gc
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from pathlib import Path
 
 import msgspec
@@ -19,8 +19,9 @@ from foretwin.world_gen.osm.map_store import MapStore, route_boxes
 from foretwin.world_gen.osm.osm_map import LatLonBounds, NoRoadsError, OsmMap
 from foretwin.world_gen.osm.read_osm import read_map
 from foretwin.world_gen.roads.build_graph import build_road_graph
-from foretwin.world_gen.roads.road_graph import RoadGraph
+from foretwin.world_gen.roads.road_graph import EdgeKey, RoadGraph
 from foretwin.world_gen.roads.service_roads import with_roads, with_service_roads
+from foretwin.world_gen.roads.tidal_roads import with_tides
 
 LARGE_MAP_BYTES = 64_000_000
 """Of larger files, what is needed is clipped from an index on disk, made on first use."""
@@ -42,7 +43,15 @@ class OpenMap(msgspec.Struct, frozen=True):
         """Return the map where the edges of these indices count as car roads as well."""
         if not added:
             return self
-        graph = with_roads(self.graph, added)
+        return self._of(with_roads(self.graph, added))
+
+    def with_tides(self, driven: Collection[EdgeKey]) -> OpenMap:
+        """Return the map with tidal roads driven one way, as the route of these edges drives them;
+        without a route as it is."""
+        graph = with_tides(self.graph, driven) if driven else self.graph
+        return self if graph is self.graph else self._of(graph)
+
+    def _of(self, graph: RoadGraph) -> OpenMap:
         return OpenMap(self.file, self.osm, graph, find_intersections(self.osm, graph))
 
 
@@ -66,12 +75,14 @@ def open_map(
     *,
     clip: Clip | NodeClip | LatLonBounds | None = None,
     service_roads: bool = False,
+    tides: bool = True,
     large_bytes: int = LARGE_MAP_BYTES,
     open_index: Callable[[Path], MapStore] = MapStore.open,
 ) -> OpenMap:
     """Read a map, or of a large one what `clip` needs, and find its junctions.
 
     With `service_roads`, driveways and parking aisles open to cars are roads like any other.
+    Without `tides`, tidal roads are open both ways, for who is to drive them (`with_tides`).
     Raises MapError where the file is no map or has no roads there.
     """
     if clip is not None and file.is_file() and file.stat().st_size >= large_bytes:
@@ -81,6 +92,8 @@ def open_map(
     graph = build_road_graph(osm)
     if service_roads:
         graph = with_service_roads(graph)
+    if tides:
+        graph = with_tides(graph)
     junctions = find_intersections(osm, graph)
     # A map stays for as long as its process: the collector need not visit it again and again.
     gc.freeze()

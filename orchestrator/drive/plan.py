@@ -55,8 +55,6 @@ from foretwin.world_gen.roads.service_roads import open_service_roads
 
 NEAR_ROAD_M = 50.0
 """A log none of whose positions lies this near to a road was not driven in this map."""
-
-
 CORRIDOR_M = 2000.0
 """Of a large map, what lies within this distance of a given route or drive is read."""
 
@@ -99,7 +97,7 @@ def read_inputs(config: DriveConfig) -> DriveInputs:
     given = _given_line(config, positions)
     near = positions if positions is not None else given
     clip = None if near is None else Clip(near, CORRIDOR_M)
-    opened = open_map(map_file, clip=clip)
+    opened = open_map(map_file, clip=clip, tides=False)
     # For its errors alone, before anything starts: the process that builds Worlds reads them.
     earlier = tracks_for(opened.osm.bounds, config.tracks)
     osm, graph, junctions = opened.osm, opened.graph, opened.junctions
@@ -107,13 +105,13 @@ def read_inputs(config: DriveConfig) -> DriveInputs:
     if positions is not None and log_file is not None:
         _check_in_map(positions, log_file, index, map_file)
     routes, route_source = _routes(config, graph, index, given)
-    used = (item.edge for route in routes for item in route.edges)
-    added = open_service_roads(graph.edges if config.service_roads else used)
-    if added:
-        # Only now is it known where the route leaves the streets; what it meets there counts.
-        opened = opened.with_roads(added)
-        graph, junctions = opened.graph, opened.junctions
-        index = RoadIndex(graph)
+    used = [item for route in routes for item in route.edges]
+    added = open_service_roads(graph.edges if config.service_roads else (i.edge for i in used))
+    driven = tuple(item.key for item in used)
+    # Only now is it known where the route leaves the streets, and which way round it drives.
+    fit = opened.with_roads(added).with_tides(driven)
+    if fit is not opened:
+        opened, graph, junctions, index = fit, fit.graph, fit.junctions, RoadIndex(fit.graph)
         routes, route_source = _routes(config, graph, index, given)
     if config.worlds is not None:
         check_given_worlds(Path(config.worlds), osm, junctions, radius_m=config.radius_m)
@@ -142,6 +140,7 @@ def read_inputs(config: DriveConfig) -> DriveInputs:
         index=index,
         junctions=junctions,
         added_roads=added,
+        driven_edges=driven,
         routes=routes,
         route_source=route_source,
         drive_frame=drive_frame,

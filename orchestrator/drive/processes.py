@@ -145,13 +145,13 @@ def _tunes(plan: DrivePlan) -> bool:
 
 def _builder(plan: DrivePlan, process_id: str) -> ProcessSetup:
     clip = plan.clip
-    near_deg = () if clip is None else tuple((lat, lon) for lat, lon in clip.line_deg.tolist())
     return BuilderSetup(
         **_base(plan, process_id),
         map=str(plan.map_file),
-        near_deg=near_deg,
+        near_deg=() if clip is None else tuple((a, b) for a, b in clip.line_deg.tolist()),
         margin_m=0.0 if clip is None else clip.margin_m,
         added_roads=plan.added_roads,
+        driven_edges=plan.driven_edges,
         dem=plan.config.dem,
         tracks=plan.config.tracks,
         worlds_dir=str(plan.worlds_dir),

@@ -28,8 +28,9 @@ log = logging.getLogger("builder")
 def serve_builds(setup: BuilderSetup, bus: Bus, life: ProcessLife) -> None:
     """Read the map once, then answer build requests until the run ends."""
     near = np.array(setup.near_deg, dtype=np.float64).reshape(-1, 2)
-    opened = open_map(Path(setup.map), clip=Clip(near, setup.margin_m) if len(near) else None)
-    opened = opened.with_roads(setup.added_roads)
+    clip = Clip(near, setup.margin_m) if len(near) else None
+    opened = open_map(Path(setup.map), clip=clip, tides=False)
+    opened = opened.with_roads(setup.added_roads).with_tides(setup.driven_edges)
     osm, graph = opened.osm, opened.graph
     junctions = {j.summary.id: j for j in opened.junctions}
     dem = heights_for(opened, None if setup.dem is None else Path(setup.dem))

@@ -118,7 +118,7 @@ def choose_junctions(
     elif route is not None:
         line_deg = read_route(route)
         clip = Clip(line_deg, radius_m)
-    opened = open_map(map_file, clip=clip, service_roads=service_roads)
+    opened = open_map(map_file, clip=clip, service_roads=service_roads, tides=route is None)
     if at is not None:
         return ChosenJunctions(opened, (nearest_junction(opened, *place),))
     if junction_id is not None:
@@ -136,8 +136,9 @@ def junctions_along(opened: OpenMap, route: Path, line_deg: Array) -> ChosenJunc
     from foretwin.world_gen.roads.service_roads import open_service_roads
 
     matched = match_line(opened.graph, line_deg, name=f"--route {route}")
-    used = (item.edge for stretch in matched.routes for item in stretch.edges)
-    opened = opened.with_roads(open_service_roads(used))
+    used = [item for stretch in matched.routes for item in stretch.edges]
+    opened = opened.with_roads(open_service_roads(item.edge for item in used))
+    opened = opened.with_tides([item.key for item in used])
     junctions = tuple(
         passage.junction
         for stretch in matched.routes

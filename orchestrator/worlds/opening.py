@@ -15,6 +15,7 @@ def open_map(
     *,
     clip: Clip | NodeClip | LatLonBounds | None = None,
     service_roads: bool = False,
+    tides: bool = True,
     large_bytes: int = LARGE_MAP_BYTES,
 ) -> OpenMap:
     """Read a map; see `foretwin.world_gen.opening`."""
@@ -22,6 +23,7 @@ def open_map(
         file,
         clip=clip,
         service_roads=service_roads,
+        tides=tides,
         large_bytes=large_bytes,
         open_index=_behind_a_bar,
     )

@@ -17,6 +17,7 @@ from foretwin.world_gen.osm.osm_map import OsmMap
 from foretwin.world_gen.roads.beside_roads import BesideIndex
 from foretwin.world_gen.roads.road_classes import OTHER_CLASSES
 from foretwin.world_gen.roads.road_graph import RoadGraph
+from foretwin.world_gen.roads.road_tags import is_tidal
 from foretwin.world_gen.roads.turn_restrictions import TurnRestrictions, read_turn_restrictions
 from foretwin.world_gen.roadside.obstacles import ObstacleIndex
 
@@ -42,10 +43,13 @@ class MapIndex(msgspec.Struct, frozen=True, kw_only=True):
 
     @property
     def map_key(self) -> str:
-        """The map's SHA-256, which roads count as car roads beyond its tags, and the heights'."""
-        edges = (self.graph.edges[i] for i in self.car_edges)
+        """The map's SHA-256, which roads count as car roads beyond its tags, which way round tidal
+        ones are driven, and the heights'."""
+        edges = [self.graph.edges[i] for i in self.car_edges]
         others = (edge for edge in edges if edge.road_class in OTHER_CLASSES)
+        tidal = (edge for edge in edges if edge.one_way and is_tidal(edge.tags))
         added = [f"w{edge.way_id}.{edge.start_node}.{edge.end_node}" for edge in others]
+        added += [f"{'+' if e.forward else '-'}w{e.way_id}.{e.start_node}" for e in tidal]
         key = self.osm.sha256 if not added else f"{self.osm.sha256} with {' '.join(added)}"
         key = key if self.profiles is None else f"{key} over {self.profiles.dem.key}"
         return key if self.tracks is None else f"{key} driven {self.tracks.key}"

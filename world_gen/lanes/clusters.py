@@ -30,6 +30,7 @@ from foretwin.world_gen.lanes.trims import trims
 from foretwin.world_gen.roads.joined_edges import read_tags
 from foretwin.world_gen.roads.node_notes import barrier_notes, level_crossing_notes, level_notes
 from foretwin.world_gen.roads.road_graph import DirectedEdge, EdgeKey, RoadEdge, country_of, side_of
+from foretwin.world_gen.roads.tidal_roads import tidal_notes
 from foretwin.world_gen.roads.turn_restrictions import restriction_notes
 
 _REPEAT_M = 0.01
@@ -141,6 +142,7 @@ def surroundings(
             *barrier_notes(edges.values(), graph.closed_nodes, index.osm.node_tags),
             *level_notes((graph.edges[i] for i in edges), graph.passed_over),
             *level_crossing_notes((graph.edges[i] for i in edges), index.osm.node_tags),
+            *tidal_notes(edges.values()),
             *_side_notes(edges, side),
             *_beyond_notes(made_for, edges, cut_m, extent),
         ),

@@ -11,6 +11,7 @@ from foretwin.world_gen.lanes.lane_plans import LanePlan, of_side, tagged_width
 from foretwin.world_gen.lanes.side_lanes import BICYCLE_WIDTH_M
 from foretwin.world_gen.roads.road_classes import road_class
 from foretwin.world_gen.roads.road_graph import RoadEdge
+from foretwin.world_gen.roads.road_tags import is_tidal
 from foretwin.world_gen.roads.speed_limits import posted_limit
 
 DEFAULT_WIDTH_M = 3.0
@@ -109,6 +110,7 @@ def lanes_of_direction(
     kinds = _kinds(tags)
     tagged = "oneway" in edge.tags or "junction" in edge.tags
     source: Provenance = "tagged" if tagged else "inferred"
+    source = "default" if is_tidal(edge.tags) else source
     letter = "b" if reverse else "f"
     lanes = []
     for i in range(count):

@@ -150,6 +150,17 @@ class RoadGraph(msgspec.Struct, frozen=True, kw_only=True):
         x_m, y_m = sum([x for x, _ in points]), sum([y for _, y in points])
         return x_m / len(points), y_m / len(points)
 
+    def with_edges(self, changed: Mapping[int, RoadEdge]) -> RoadGraph:
+        """Return the graph with other edges at these indices, of the same nodes."""
+        leaving = dict(self.leaving)
+        for node in {n for edge in changed.values() for n in (edge.start_node, edge.end_node)}:
+            leaving[node] = tuple(
+                DirectedEdge(changed.get(leg.edge.index, leg.edge), leg.reverse)
+                for leg in self.leaving[node]
+            )
+        edges = tuple(changed.get(edge.index, edge) for edge in self.edges)
+        return msgspec.structs.replace(self, edges=edges, leaving=leaving)
+
     def at_node(self, node: int) -> tuple[DirectedEdge, ...]:
         """Return the directed edges that start at `node`, allowed or not."""
         return self.leaving.get(node, ())

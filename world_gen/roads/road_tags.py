@@ -34,6 +34,7 @@ ONEWAY: Mapping[str, Directions] = {
     **dict.fromkeys(("-1", "reverse"), Directions(False, True)),
     **dict.fromkeys(("no", "false", "0", "reversible", "alternating"), Directions(True, True)),
 }
+"""Tidal roads are open both ways until it is known which one holds (`tidal_roads`)."""
 
 
 def is_car_road(tags: Mapping[str, str]) -> bool:
@@ -63,13 +64,24 @@ def directions(tags: Mapping[str, str]) -> Directions:
     """Return which ways round cars may drive: one-way signs, implied one-way, access."""
     if not open_to_cars(tags):
         return Directions(False, False)
-    oneway = tags.get("oneway:motor_vehicle") or tags.get("oneway:vehicle") or tags.get("oneway")
+    oneway = _oneway(tags)
     implied = tags.get("junction") in RING_TAGS or tags.get("highway") == "motorway"
-    forward, backward = ONEWAY.get(oneway or "", Directions(True, not implied))
+    forward, backward = ONEWAY.get(oneway, Directions(True, not implied))
     for key in ("motor_vehicle", "vehicle"):
         forward = forward and tags.get(f"{key}:forward") != "no"
         backward = backward and tags.get(f"{key}:backward") != "no"
     return Directions(forward, backward)
+
+
+def is_tidal(tags: Mapping[str, str]) -> bool:
+    """Tell whether all lanes of a road are driven one way, now this one and now the other."""
+    lanes_each_way = "lanes:forward" in tags and "lanes:backward" in tags
+    return _oneway(tags) == "reversible" and not lanes_each_way
+
+
+def _oneway(tags: Mapping[str, str]) -> str:
+    keys = ("oneway:motor_vehicle", "oneway:vehicle", "oneway")
+    return next((tags[key] for key in keys if tags.get(key)), "")
 
 
 class LaneCounts(NamedTuple):

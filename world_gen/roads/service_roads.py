@@ -6,7 +6,7 @@ from collections.abc import Iterable
 
 import msgspec
 
-from foretwin.world_gen.roads.road_graph import DirectedEdge, RoadEdge, RoadGraph
+from foretwin.world_gen.roads.road_graph import RoadEdge, RoadGraph
 from foretwin.world_gen.roads.road_tags import ONEWAY
 
 
@@ -30,17 +30,7 @@ def with_roads(graph: RoadGraph, edges: Iterable[int]) -> RoadGraph:
     indices, so what was found in one graph holds in the other.
     """
     added = {index for index in edges if not graph.edges[index].car}
-    if not added:
-        return graph
-    changed = tuple(_opened(edge) if edge.index in added else edge for edge in graph.edges)
-    leaving = dict(graph.leaving)
-    opened = [changed[index] for index in added]
-    ends = {node for edge in opened for node in (edge.start_node, edge.end_node)}
-    for node in ends:
-        leaving[node] = tuple(
-            DirectedEdge(changed[item.edge.index], item.reverse) for item in graph.leaving[node]
-        )
-    return msgspec.structs.replace(graph, edges=changed, leaving=leaving)
+    return graph.with_edges({i: _opened(graph.edges[i]) for i in added}) if added else graph
 
 
 def _opened(edge: RoadEdge) -> RoadEdge:

@@ -24,6 +24,7 @@ from foretwin.orchestrator.other_vehicle_config import OtherVehicleConfig
 from foretwin.orchestrator.worlds.opening import open_map
 from foretwin.world_gen.junctions.intersections import junctions_on_route
 from tests.orchestrator.trip import NOW, town, town_line, town_plan
+from tests.orchestrator.worlds.tidal_street import TidalStreet
 from tests.world_gen.sketch import Sketch
 
 COVERS = ("foretwin.orchestrator.plan",)
@@ -217,6 +218,12 @@ def test_by_choice_every_driveway_makes_a_junction(tmp_path: Path) -> None:
     inputs = inputs_for(tmp_path, map=map_file, route=route, service_roads=True)
 
     assert [j.summary.id for j in inputs.junctions] == ["n2", "n5"]  # type: ignore[attr-defined]
+
+
+def test_a_tidal_road_runs_as_the_route_drives_it(tmp_path: Path) -> None:
+    street = TidalStreet(tmp_path)
+    routed = inputs_for(tmp_path, map=str(street.map_file), route=str(street.eastward))
+    assert all(item.allowed for item in routed.routes[0].edges)  # type: ignore[attr-defined]
 
 
 @pytest.mark.real_data

@@ -10,19 +10,14 @@ import msgspec
 import pytest
 
 from foretwin.contracts.errors import UserError
-from foretwin.contracts.simulation import BuildReply, BuildRequest
 from foretwin.contracts.world import World
 from foretwin.contracts.world_identity import with_id
 from foretwin.orchestrator.config import DriveConfig
 from foretwin.orchestrator.drive.plan import read_inputs
-from foretwin.orchestrator.drive.processes import PROCESSES
-from foretwin.orchestrator.worlds.builder_process import serve_builds
 from foretwin.orchestrator.worlds.given_worlds import check_given_worlds, read_given_worlds
 from foretwin.world_gen.world_store import WorldStore
-from tests.contracts.memory_bus import MemoryBus
 from tests.orchestrator.trip import town, town_plan, town_world
-
-COVERS = ("foretwin.orchestrator.worlds.builder_process",)
+from tests.orchestrator.worlds.asked_builder import built
 
 
 def saved(folder: Path, *worlds: World) -> Path:
@@ -112,17 +107,6 @@ def test_a_drive_refuses_them_before_anything_begins(tmp_path: Path) -> None:
     assert not (tmp_path / "runs").exists()
 
 
-class UntilAnswered:
-    """A life that lasts for one question; asks it as the builder is ready."""
-
-    def __init__(self, ask: Callable[[], None], answered: Callable[[], bool]) -> None:
-        self.ready, self._answered = ask, answered
-
-    @property
-    def over(self) -> bool:
-        return self._answered()
-
-
 @pytest.mark.parametrize("junction_id", ["n4", "n11"])
 def test_the_builder_gives_out_what_was_given_and_builds_the_rest(
     tmp_path: Path, junction_id: str
@@ -133,18 +117,6 @@ def test_the_builder_gives_out_what_was_given_and_builds_the_rest(
         plan.config, worlds=str(saved(tmp_path, given)), cache_dir=str(tmp_path / "cache")
     )
     plan = replace(plan, config=config)
-    (row,) = (row for row in PROCESSES if row.name == "builder")
-    bus, answers = MemoryBus(), []
-    box = type("Answers", (), {"put": lambda _, item: answers.append(item)})()
-
-    def ask() -> None:
-        request = BuildRequest(intersection_id=junction_id, radius_m=150.0)
-        bus.request("build", request, box, run=plan.run_id, process="builder")
-
-    setup = row.setup(plan, "builder")
-    serve_builds(setup, bus, UntilAnswered(ask, lambda: bool(answers)))  # type: ignore[arg-type]
-    (answer,) = answers
-    assert isinstance(answer.message, BuildReply), answer.error
-    used = WorldStore(plan.worlds_dir).load(answer.message.world_id)
+    used = built(plan, junction_id)
     assert (used.id == with_id(given).id) == (junction_id == "n4")
     assert bool(used.buildings) == (junction_id != "n4")
