@@ -232,7 +232,7 @@ class WayAhead:
             return None
         reach_m = horizon_s * max(speed_mps + 8.0, 15.0) + PATH_SPARE_M
         if self._lanes is None or self._lanes.world_id != world.id:
-            self._lanes = WorldLanes(world, self._graph.frame)
+            self._lanes = WorldLanes(world, self._graph)
         route = self._follower.route
         guide = LaneGuide(self._lanes, route, car_s_m=self.s_m, car_xy_m=self._xy_m)
         geometry = driving_path(

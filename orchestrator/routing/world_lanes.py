@@ -15,13 +15,15 @@ import numpy.typing as npt
 from scipy.spatial import cKDTree
 
 from foretwin.contracts.arrays import Array
-from foretwin.contracts.frames import LocalFrame, target_from_source_m
+from foretwin.contracts.frames import target_from_source_m
 from foretwin.contracts.world import World
 from foretwin.geometry.polyline import densified, headings_rad
 from foretwin.orchestrator.routing.driving_path import turn_radii
 from foretwin.orchestrator.routing.rounding import FINE_M
 from foretwin.orchestrator.routing.route import Route
-from foretwin.world_gen.roads.joined_edges import alike
+from foretwin.world_gen.lanes.past_driveways import past_driveway
+from foretwin.world_gen.roads.joined_edges import SHORT_M
+from foretwin.world_gen.roads.road_graph import DirectedEdge, EdgeKey, RoadGraph
 
 BESIDE_M = 15.0
 """A lane farther from the route's path than this is no lane of its road."""
@@ -71,13 +73,15 @@ class Followed(NamedTuple):
 class WorldLanes:
     """The lanes of a World that cars drive, in the road graph's frame."""
 
-    def __init__(self, world: World, frame: LocalFrame) -> None:
+    def __init__(self, world: World, graph: RoadGraph) -> None:
         def line(xy_m: Array) -> tuple[Array, Array]:
-            moved = target_from_source_m(frame, world.frame, xy_m)
+            moved = target_from_source_m(graph.frame, world.frame, xy_m)
             fine = densified(moved, spacing_m=FINE_M)
             return fine, headings_rad(fine)
 
         self.world_id = world.id
+        self._graph = graph
+        self._roads: dict[EdgeKey, frozenset[tuple[int, bool]]] = {}
         self.turn_radii_m = turn_radii(world.intersection.driving_side)
         pieces = {}
         for lane in world.lanes:
@@ -106,10 +110,8 @@ class WorldLanes:
         for number in range(first, last + 1):
             edge = route.edges[number]
             span = float(route.start_m[number]), float(route.start_m[number + 1])
-            # Past a driveway a World's lane may go on into the next way, and is of one of both.
-            for other in route.edges[max(number - 1, 0) : number + 2]:
-                if other is edge or alike(other.edge, edge.edge):
-                    spans.setdefault((other.edge.way_id, other.reverse), []).append(span)
+            for road in self._roads_of(edge):
+                spans.setdefault(road, []).append(span)
         found = {}
         for piece in self._pieces:
             if piece.road is not None and piece.road in spans:
@@ -122,6 +124,21 @@ class WorldLanes:
                 if one is not None:
                     found[piece.id] = one
         return list(found.values())
+
+    def _roads_of(self, edge: DirectedEdge) -> frozenset[tuple[int, bool]]:
+        """Return of which ways its lanes may be, with whether they are driven against its nodes.
+
+        Past driveways a World's lane goes on into the next way, and is of one of them.
+        """
+        if edge.key not in self._roads:
+            ways = {edge.edge.way_id}
+            for here in (edge, edge.back):
+                beyond_m = 0.0
+                while beyond_m < SHORT_M and (ahead := past_driveway(self._graph, here)):
+                    ways.add(ahead.edge.way_id)
+                    beyond_m, here = beyond_m + ahead.edge.length_m, ahead
+            self._roads[edge.key] = frozenset((way, edge.reverse) for way in ways)
+        return self._roads[edge.key]
 
 
 def inside(world: World, xy_m: Array) -> npt.NDArray[np.bool_]:

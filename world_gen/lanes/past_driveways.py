@@ -59,8 +59,8 @@ def past_driveways(
                 continue
             length_m, here = edge.length_m, leg
             while length_m < SHORT_M and here.end_node not in in_junctions:
-                ahead = _past_driveway(graph, edges, here)
-                if ahead is None:
+                ahead = past_driveway(graph, here)
+                if ahead is None or ahead.edge.index not in edges:
                     break
                 first, second = (ahead, here) if here.reverse else (here, ahead)
                 after[first.edge.index] = second.edge.index
@@ -76,16 +76,13 @@ def past_driveways(
     return JoinedRoads(found)
 
 
-def _past_driveway(
-    graph: RoadGraph, edges: Mapping[int, RoadEdge], here: DirectedEdge
-) -> DirectedEdge | None:
-    """Return the edge in which one goes on where only driveways join it."""
+def past_driveway(graph: RoadGraph, here: DirectedEdge) -> DirectedEdge | None:
+    """Return the edge in which one goes on where only driveways join it, None where none does."""
     leaving = graph.at_node(here.end_node)
     cars = [leg for leg in leaving if leg.edge.drivable]
     if len(cars) != 2 or len(leaving) == 2:
         return None
     ahead = next((leg for leg in cars if leg.edge.index != here.edge.index), None)
-    if ahead is None or ahead.edge.index not in edges or ahead.reverse != here.reverse:
+    if ahead is None or ahead.reverse != here.reverse:
         return None
-    goes_on = alike(here.edge, ahead.edge)
-    return DirectedEdge(edges[ahead.edge.index], ahead.reverse) if goes_on else None
+    return ahead if alike(here.edge, ahead.edge) else None

@@ -55,7 +55,7 @@ class Town:
         """
         xy = np.array(at)
         s_m = 100.0 + at[0] if s_m is None else s_m
-        lanes = WorldLanes(self.world, self.graph.frame)
+        lanes = WorldLanes(self.world, self.graph)
         guide = LaneGuide(lanes, self.route, car_s_m=s_m, car_xy_m=xy)
         self.path = driving_path(
             self.route,
@@ -179,9 +179,7 @@ def test_a_route_that_no_lane_follows_keeps_its_path() -> None:
     graph, world = build_road_graph(osm), world_of(osm)
     edges = {edge.way_id: edge for edge in graph.edges}
     route = Route((DirectedEdge(edges[EAST], True), DirectedEdge(edges[WEST], True)))
-    guide = LaneGuide(
-        WorldLanes(world, graph.frame), route, car_s_m=50.0, car_xy_m=np.array([50.0, 0.0])
-    )
+    guide = LaneGuide(WorldLanes(world, graph), route, car_s_m=50.0, car_xy_m=np.array([50.0, 0.0]))
     led = driving_path(route, s_from_m=40.0, s_to_m=200.0, onto_lanes=guide.onto_lanes)
     plain = driving_path(route, s_from_m=40.0, s_to_m=200.0)
 

@@ -89,7 +89,9 @@ def test_a_road_for_cars_is_a_junction_of_its_own() -> None:
     assert "w11.20.1" in ids
 
 
-@pytest.mark.parametrize(("parted", "beyond"), [(False, False), (False, True), (True, True)])
+@pytest.mark.parametrize(
+    ("parted", "beyond"), [(False, False), (False, True), (True, True), (True, False)]
+)
 def test_a_route_follows_the_lane_that_goes_on_past_the_driveway(
     parted: bool, beyond: bool
 ) -> None:
@@ -99,7 +101,7 @@ def test_a_route_follows_the_lane_that_goes_on_past_the_driveway(
     ways = [edges[3, 0], edges[0, 20], edges[20, 21], edges[21, 22], edges[22, 1]]
     route = Route(tuple(DirectedEdge(edge, False) for edge in ways[: None if beyond else -1]))
     path = driving_path(route, s_from_m=0.0, s_to_m=route.end_m)
-    lanes = WorldLanes(world_of(osm), graph.frame)
+    lanes = WorldLanes(world_of(osm), graph)
 
     found = {one.piece.id: one for one in lanes.beside(route, path.xy_m, path.s_m)}
 
