@@ -45,7 +45,7 @@ FUTURE_COLUMNS = (
     "accident_kind",
     "trajectory_sha256",
 )
-"""Columns of the table of futures that a report of a drive reads."""
+"""Columns of the table of futures that a report of a drive reads, and of a sweep but for rounds."""
 
 TableRow = dict[str, Any]
 

@@ -17,7 +17,12 @@ from foretwin.contracts.arrays import Array
 from foretwin.contracts.errors import UserError, one_line
 from foretwin.contracts.world import World
 from foretwin.orchestrator.record.run_folder import SUMMARY, table_at
-from foretwin.orchestrator.report.material import KeptWorlds, TableRow, most_critical
+from foretwin.orchestrator.report.material import (
+    FUTURE_COLUMNS,
+    KeptWorlds,
+    TableRow,
+    most_critical,
+)
 from foretwin.orchestrator.sweep.folder import WORLDS
 from foretwin.orchestrator.sweep.manifest import listed_parts
 from foretwin.orchestrator.sweep.spec import SweepSpec
@@ -27,29 +32,10 @@ from foretwin.sim_worker.futures.job_tables import JOB_TABLES
 from foretwin.sim_worker.metrics.table import ROW_METRICS
 
 _COLUMNS = (
-    "future_id",
-    "job_sha256",
-    "index",
-    "name",
-    "world_id",
-    "junction_id",
-    "planner",
-    "scenario",
+    *(name for name in FUTURE_COLUMNS if name != "round_id"),
     "place",
     "case",
-    "valid",
-    "failure",
-    "left_out",
-    "collided",
-    "collision_time_s",
-    "collision_with",
-    "likelihood",
-    "criticality",
-    "min_clearance_m",
-    "progress_m",
-    "accident_kind",
     "accident_ego_delta_v_mps",
-    "trajectory_sha256",
 )
 
 
