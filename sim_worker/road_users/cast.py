@@ -173,15 +173,12 @@ def _row(
 def _player_row(player: Player, path: int, pace: int) -> _Row:
     traits, car, on = KINDS[player.kind], KINDS["car"], player.path
     limit_mps = float(on.speed_limit_mps[on.place(np.array([player.start_arc_m])).node[0]])
-    if np.isfinite(limit_mps):
-        # A cyclist does not drive at a share of a limit that is set for cars.
-        limit_mps = min(limit_mps, traits.speed_mps)
     motion = (
         player.lateral_m,
         player.start_arc_m,
         0.0 if player.conduct == "parked" else player.speed_mps,
         np.nan if player.desired_mps is None else player.desired_mps,
-        limit_mps,
+        traits.limit_mps(limit_mps),
         traits.accel_mps2 / car.accel_mps2,
         traits.decel_mps2 / car.decel_mps2,
         player.acts_after_s if player.conduct == "stops" else np.inf,

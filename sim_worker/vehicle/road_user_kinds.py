@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 from foretwin.contracts.drive import RoadUserKind
@@ -29,6 +30,13 @@ class KindTraits(NamedTuple):
     speed_mps: float
     source: str
     keeps_lane: bool = True
+
+    def limit_mps(self, posted_mps: float) -> float:
+        """Return the limit of which it wants a share; not finite where none is known.
+
+        A cyclist does not drive at a share of a limit that is set for cars.
+        """
+        return min(posted_mps, self.speed_mps) if math.isfinite(posted_mps) else posted_mps
 
 
 _SIZES_AND_LIMITS: dict[RoadUserKind, tuple[float, ...]] = {

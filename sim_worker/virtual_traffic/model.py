@@ -264,8 +264,8 @@ def _place(rider: Rider) -> Array:
 def _wants(rider: Rider) -> float:
     """Return how fast a road user drives on a free road where it is."""
     limit = float(rider.path.at_nodes(rider.path.speed_limit_mps, np.array([rider.arc_m]))[0])
-    most = KINDS[rider.kind].speed_mps
-    if not np.isfinite(limit):
-        return min(UNKNOWN_LIMIT_MPS, most)
-    # As those of futures: a cyclist does not drive at a share of a limit that is set for cars.
-    return min(rider.limit_share * min(limit, most), most)
+    traits = KINDS[rider.kind]
+    wanted = (
+        rider.limit_share * traits.limit_mps(limit) if np.isfinite(limit) else UNKNOWN_LIMIT_MPS
+    )
+    return min(wanted, traits.speed_mps)
