@@ -30,12 +30,14 @@ from foretwin.orchestrator.forecast.progress_model import ProgressModel
 from foretwin.orchestrator.keep import Keep, parse_keep
 from foretwin.orchestrator.routing.road_index import RoadIndex
 from foretwin.orchestrator.routing.route import Route
+from foretwin.orchestrator.routing.route_ahead import WayAhead
 from foretwin.orchestrator.routing.standin_path import StandinPath
 from foretwin.telemetry.ros2.mapping import MappingFile
 from foretwin.world_gen.junctions.intersections import Junction
 from foretwin.world_gen.opening import Clip
 from foretwin.world_gen.osm.osm_map import OsmMap
 from foretwin.world_gen.roads.road_graph import EdgeKey, RoadGraph
+from foretwin.world_gen.roads.turn_restrictions import read_turn_restrictions
 
 
 class OtherVehiclePlan(NamedTuple):
@@ -104,6 +106,17 @@ class DriveInputs:
     def commands_recorded(self) -> bool:
         """Whether the vehicle sends the commands that its automated driving gives."""
         return self.info is None or "control" in self.info.sends
+
+    def way_ahead(self) -> WayAhead:
+        """Return where the car is on the map and what comes, before the drive begins."""
+        return WayAhead(
+            self.graph,
+            self.junctions,
+            self.routes,
+            index=self.index,
+            tracks=self.tracks,
+            restrictions=read_turn_restrictions(self.osm, self.graph),
+        )
 
 
 @dataclass(frozen=True, kw_only=True)

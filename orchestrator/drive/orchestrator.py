@@ -39,9 +39,7 @@ from foretwin.orchestrator.instructions import Notice
 from foretwin.orchestrator.plan import DrivePlan
 from foretwin.orchestrator.record.results import ResultTables
 from foretwin.orchestrator.record.run_state import LOG, RECORD, RESULTS
-from foretwin.orchestrator.routing.route_ahead import WayAhead
 from foretwin.orchestrator.runner.supervisor import fold_stderr
-from foretwin.world_gen.roads.turn_restrictions import read_turn_restrictions
 
 log = logging.getLogger(ORCHESTRATOR)
 
@@ -75,14 +73,7 @@ class Orchestrator:
         self._before = read_standing(life.standing)
         self._standing: HandingOver
         self._mission = Mission(
-            WayAhead(
-                plan.graph,
-                plan.junctions,
-                plan.routes,
-                index=plan.index,
-                tracks=plan.tracks,
-                restrictions=read_turn_restrictions(plan.osm, plan.graph),
-            ),
+            plan.way_ahead(),
             MissionSettings(
                 radius_m=plan.config.radius_m,
                 look_ahead_s=plan.config.look_ahead_s,

@@ -22,7 +22,6 @@ from foretwin.orchestrator.drive.conductor import Conductor
 from foretwin.orchestrator.drive.mission import Mission, MissionSettings
 from foretwin.orchestrator.plan import DrivePlan
 from foretwin.orchestrator.record.results import ResultTables
-from foretwin.orchestrator.routing.route_ahead import WayAhead
 from foretwin.world_gen.world_store import WorldStore
 from tests.contracts.memory_bus import MemoryBus
 from tests.orchestrator.futures_rounds import nobody
@@ -200,10 +199,7 @@ class House:
         self.plan = plan or town_plan(folder, **{"least_futures": given["futures"], **given})
         self.bus = MemoryBus()
         inputs = town()
-        self.mission = Mission(
-            WayAhead(inputs.graph, inputs.junctions, inputs.routes, index=inputs.index),
-            MissionSettings(),
-        )
+        self.mission = Mission(inputs.way_ahead(), MissionSettings())
         self.tables = ResultTables(self.plan.folder / "results", {"run_id": self.plan.run_id})
         self.conductor = Conductor(self.plan, self.bus, self.mission, self.tables)
         self.conductor.join()

@@ -21,7 +21,6 @@ from foretwin.orchestrator.plan import DriveInputs
 from foretwin.orchestrator.rounds.comparisons import OpenComparisons
 from foretwin.orchestrator.rounds.jobs import RoundPlanner
 from foretwin.orchestrator.rounds.progress_forecasts import ProgressForecasts
-from foretwin.orchestrator.routing.route_ahead import WayAhead
 from foretwin.orchestrator.runner.open_rounds import RoundDone, RoundOrder
 from foretwin.sim_worker.batch.batch_simulation import BatchSimulation
 from foretwin.sim_worker.futures.run_job import run_job
@@ -30,7 +29,6 @@ from foretwin.telemetry.estimator.estimator import StateEstimator
 from foretwin.telemetry.logs.opening import open_log
 from foretwin.world_gen.build import build_world
 from foretwin.world_gen.junctions.map_index import index_map
-from foretwin.world_gen.roads.turn_restrictions import read_turn_restrictions
 
 
 class Round(NamedTuple):
@@ -91,14 +89,7 @@ class LockStep:
             steering_offset_rad=vehicle.steering_offset_rad.value,
         )  # fmt: skip
         self.mission = Mission(
-            WayAhead(
-                inputs.graph,
-                inputs.junctions,
-                inputs.routes,
-                index=inputs.index,
-                tracks=inputs.tracks,
-                restrictions=read_turn_restrictions(inputs.osm, inputs.graph),
-            ),
+            inputs.way_ahead(),
             MissionSettings(
                 radius_m=config.radius_m,
                 look_ahead_s=config.look_ahead_s,
