@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from shapely.geometry import LineString
 
 from foretwin.contracts.world import Connection, World
-from foretwin.world_gen.lanes.legs import heading_out
+from foretwin.world_gen.roads.headings import heading_out
 from foretwin.world_gen.roads.road_graph import DirectedEdge
 from tests.world_gen.drawn_stars import stars, world_of_star
 from tests.world_gen.path_shape import end_bends_rad, tightest_radius_m
@@ -21,6 +21,7 @@ from tests.world_gen.road_edges import road as straight_road
 COVERS = (
     "foretwin.world_gen.lanes.legs",
     "foretwin.world_gen.lanes.trims",
+    "foretwin.world_gen.roads.headings",
 )
 
 LEAST_RADIUS_M = 4.0

@@ -13,7 +13,8 @@ from foretwin.contracts.world import DrivingSide, Turn
 from foretwin.geometry.bends import MIN_STEP_M
 from foretwin.world_gen.lanes.cluster import Cluster
 from foretwin.world_gen.lanes.clusters import Surroundings
-from foretwin.world_gen.lanes.legs import Heads, dot, heading_out, is_ring_edge, opposed
+from foretwin.world_gen.lanes.legs import Heads, is_ring_edge, opposed
+from foretwin.world_gen.roads.headings import dot, heading_out
 from foretwin.world_gen.roads.road_graph import DirectedEdge, EdgeKey
 from foretwin.world_gen.roads.turn_restrictions import TurnRestrictions
 

@@ -21,12 +21,13 @@ from foretwin.world_gen.junctions.map_index import MapIndex
 from foretwin.world_gen.lanes.cluster import Cluster, clusters_of
 from foretwin.world_gen.lanes.cross_section import cross_section, widened
 from foretwin.world_gen.lanes.lane_plans import CrossSection, LanesAlong
-from foretwin.world_gen.lanes.legs import Heads, heading_out, is_ring_edge
+from foretwin.world_gen.lanes.legs import Heads, is_ring_edge
 from foretwin.world_gen.lanes.past_driveways import JoinedRoads, past_driveways
 from foretwin.world_gen.lanes.places import whole_where_led_through
 from foretwin.world_gen.lanes.ring_curves import ring_curves
 from foretwin.world_gen.lanes.transitions import transition_shifts
 from foretwin.world_gen.lanes.trims import trims
+from foretwin.world_gen.roads.headings import heading_out
 from foretwin.world_gen.roads.joined_edges import read_tags
 from foretwin.world_gen.roads.node_notes import barrier_notes, level_crossing_notes, level_notes
 from foretwin.world_gen.roads.road_graph import DirectedEdge, EdgeKey, RoadEdge, country_of, side_of

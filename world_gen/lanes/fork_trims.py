@@ -11,7 +11,8 @@ import shapely
 from foretwin.geometry.polyline_batch import Polylines, cut, without_repeats
 from foretwin.world_gen.lanes.cluster import Cluster
 from foretwin.world_gen.lanes.lane_plans import CrossSection
-from foretwin.world_gen.lanes.legs import Heads, dot, is_ring_edge
+from foretwin.world_gen.lanes.legs import Heads, is_ring_edge
+from foretwin.world_gen.roads.headings import dot
 from foretwin.world_gen.roads.road_graph import DirectedEdge, EdgeKey
 
 LOOK_M = 300.0

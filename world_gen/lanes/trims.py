@@ -13,16 +13,16 @@ from foretwin.geometry.polyline_batch import Polylines, cut, without_repeats
 from foretwin.world_gen.lanes.cluster import Cluster
 from foretwin.world_gen.lanes.fork_trims import fork_trims
 from foretwin.world_gen.lanes.lane_plans import CrossSection
-from foretwin.world_gen.lanes.legs import Heads, dot, heading_out, is_ring_edge, lateral_positions
+from foretwin.world_gen.lanes.legs import Heads, is_ring_edge, lateral_positions
 from foretwin.world_gen.lanes.stopping import NodeTags, before_crossings_m, stop_line_m
 from foretwin.world_gen.lanes.turning_room import turning_trims
+from foretwin.world_gen.roads.headings import dot, heading_out
 from foretwin.world_gen.roads.road_graph import DirectedEdge, EdgeKey, RoadEdge
 
 CORNER_M = 3.5
 """Room between the kerb of the other road and a lane's end."""
 RING_CORNER_M = 1.5
-MAX_TRIM_M = 30.0
-_LEG_LOOK_M = 45.0
+MAX_TRIM_M, _LEG_LOOK_M = 30.0, 45.0
 _OWN_START_M = 15.0
 """What overlaps a leg farther out belongs to another place, unless it goes on from here."""
 TAPER_M = 6.0

@@ -10,10 +10,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping
 
 import msgspec
-import numpy as np
 
-from foretwin.contracts.arrays import Array
-from foretwin.geometry.polyline import points_at
+from foretwin.world_gen.roads.headings import dot, heading_out
 from foretwin.world_gen.roads.road_graph import DirectedEdge, EdgeKey, RoadEdge, RoadGraph
 from foretwin.world_gen.roads.road_tags import Directions, is_tidal, lane_counts
 
@@ -87,15 +85,8 @@ def _led_on(graph: RoadGraph, here: DirectedEdge, tidal: set[int]) -> list[Direc
     others = [leg for leg in legs if leg.edge.index != here.edge.index]
     if len(others) == 1:
         return others
-    back = _heading(here.back)
-    cosines = [float(_heading(leg) @ back) for leg in others]
+    back = heading_out(here.back, _HEADING_OVER_M)
+    cosines = [dot(heading_out(leg, _HEADING_OVER_M), back) for leg in others]
     onward = [leg for leg, cos in zip(others, cosines, strict=True) if cos < -_SAME_WAY_COS]
     beside = [leg.back for leg, cos in zip(others, cosines, strict=True) if cos > _SAME_WAY_COS]
     return onward + beside
-
-
-def _heading(leg: DirectedEdge) -> Array:
-    """Return the direction (2,) in which a road leaves its node."""
-    line = leg.xy_m
-    step = points_at(line, _HEADING_OVER_M) - line[0]
-    return np.asarray(step / max(float(np.hypot(*step)), 1e-9))

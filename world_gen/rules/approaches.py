@@ -13,13 +13,14 @@ from foretwin.contracts.world import LineControl, YieldRule
 from foretwin.world_gen.connections.lane_connections import ConnectionDraft
 from foretwin.world_gen.lanes.cluster import Cluster
 from foretwin.world_gen.lanes.clusters import Surroundings
-from foretwin.world_gen.lanes.legs import RING_KINDS, dot, heading_out, is_ring_edge
+from foretwin.world_gen.lanes.legs import RING_KINDS, is_ring_edge
 from foretwin.world_gen.lanes.stopping import (
     BEFORE_CROSSING_M,
     CROSSING_NEAR_M,
     OWN_LINE_M,
     NodeTags,
 )
+from foretwin.world_gen.roads.headings import dot, heading_out
 from foretwin.world_gen.roads.road_graph import DirectedEdge, EdgeKey
 from foretwin.world_gen.roads.road_tags import is_crossed
 from foretwin.world_gen.rules.control_devices import (

@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 from foretwin.contracts.provenance import Provenance
 from foretwin.contracts.world import DrivingSide, YieldRule
-from foretwin.world_gen.lanes.legs import heading_out
+from foretwin.world_gen.roads.headings import heading_out
 from foretwin.world_gen.roads.road_classes import road_class
 from foretwin.world_gen.roads.road_graph import DirectedEdge, RoadEdge
 
