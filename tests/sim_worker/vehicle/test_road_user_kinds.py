@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import get_args
 
 import pytest
@@ -30,3 +31,9 @@ def test_who_walks_is_lighter_and_slower_than_who_rides() -> None:
     assert masses == sorted(masses)
     assert KINDS["pedestrian"].speed_mps < KINDS["bicycle"].speed_mps < KINDS["tram"].speed_mps
     assert [kind for kind in KINDS if not KINDS[kind].keeps_lane] == ["pedestrian"]
+
+
+def test_nobody_wants_a_share_of_a_limit_beyond_what_it_can_drive() -> None:
+    assert KINDS["bicycle"].limit_mps(13.9) == KINDS["bicycle"].speed_mps
+    assert KINDS["car"].limit_mps(13.9) == 13.9
+    assert KINDS["bicycle"].limit_mps(math.inf) == math.inf, "an unknown limit stays unknown"
