@@ -50,7 +50,9 @@ def _fate(tests: list[str], within_s: float | None) -> str:
         _, status = os.waitpid(child, 0)
     if not ended:
         return "timed out"
-    return "passed" if os.waitstatus_to_exitcode(status) == 0 else "failed"
+    # A file of judge tests alone has none for every day, and notices nothing.
+    unmoved = (pytest.ExitCode.OK, pytest.ExitCode.NO_TESTS_COLLECTED)
+    return "passed" if os.waitstatus_to_exitcode(status) in unmoved else "failed"
 
 
 def _run(tests: list[str]) -> None:
