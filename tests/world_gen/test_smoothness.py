@@ -107,6 +107,7 @@ def _mirrored(mine: np.ndarray, its: np.ndarray) -> bool:
 def test_a_leg_heads_where_it_leads_over_its_first_metres():
     line = np.array([[100.0, 50.0], [103.0, 54.0], [107.0, 57.0]])
     bent = msgspec.structs.replace(straight_road(), xy_m=line)
+    assert heading_out(DirectedEdge(bent, reverse=False), 2.0) == pytest.approx((0.6, 0.8))
     assert heading_out(DirectedEdge(bent, reverse=False), 5.0) == pytest.approx((0.6, 0.8))
     assert heading_out(DirectedEdge(bent, reverse=False), 10.0) == pytest.approx(
         np.array([7.0, 7.0]) / math.hypot(7.0, 7.0)
