@@ -17,12 +17,14 @@ from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.contracts.world import World
 from foretwin.geometry.frenet_path import FrenetPath
 from foretwin.sim_worker.futures.aims import Aims, aims_of, bend_accel_of, limit_share
+from foretwin.sim_worker.futures.kept_offset import kept_offset_m
 from foretwin.sim_worker.futures.lights import Lights, lights_of
 from foretwin.sim_worker.futures.number_columns import NumberColumns, number_columns
 from foretwin.sim_worker.metrics.ground import DrivableGround
 from foretwin.sim_worker.metrics.lane_areas import LaneAreas
 from foretwin.sim_worker.planner_interface import KnownPlan, SharedGround
 from foretwin.sim_worker.planners.registry import drives_backwards
+from foretwin.sim_worker.planners.tracking import MIN_LOOKAHEAD_M
 from foretwin.sim_worker.road_users.cast import Player, casting
 from foretwin.sim_worker.road_users.manners import key_of
 from foretwin.sim_worker.road_users.path_table import PathTable
@@ -30,6 +32,7 @@ from foretwin.sim_worker.road_users.perception import PerceptionFaults, Sight
 from foretwin.sim_worker.road_users.right_of_way import JunctionRules, PathRules
 from foretwin.sim_worker.road_users.sight_lines import OpaqueGrid, opaque_grid
 from foretwin.sim_worker.road_users.traffic import Traffic
+from foretwin.sim_worker.scenarios.impact import ego_box
 from foretwin.sim_worker.scenarios.live import KnownScenarios
 from foretwin.sim_worker.scenarios.places import Unplaced
 from foretwin.sim_worker.scenarios.roads import RoadNetwork
@@ -145,7 +148,15 @@ class SceneMaker:
             # Ways may be long, and cross themselves.
             place = path.locate(starts[:, :2], near_arc_m=start_arc_m)
         numbers = number_columns(job.futures)
-        aims = aims_of(job, place.offset_m, numbers)
+        kept_m = place.offset_m.copy()
+        if job.starts is None and (here := [row for row in range(count) if row not in staged]):
+            from_m, speed_mps = float(place.arc_m[here[0]]), float(starts[here[0], 3])
+            car = ego_box(vehicle, path, speed_mps, float(kept_m[here[0]]))
+            reach_m = job.horizon_s * max(speed_mps, job.cruise_speed_mps)
+            kept_m[here] = kept_offset_m(
+                self.network.walls, car, from_m=from_m + MIN_LOOKAHEAD_M, upto_m=from_m + reach_m
+            )
+        aims = aims_of(job, kept_m, numbers)
         live = any(v.scenario_id and not v.place for v in job.futures)
         on_path = self.scenarios.on(path, float(place.arc_m[0]), vehicle) if live else None
         seen = self._seen.actors(job.road_users)

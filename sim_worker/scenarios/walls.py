@@ -45,6 +45,12 @@ class Walls:
         """Return whether a shape touches what stops all."""
         return len(self._tree.query(shape, "intersects")) > 0
 
+    def stop(self, boxes: Rectangles) -> bool:
+        """Return whether any of boxes (N,) of a vehicle touches what stops it."""
+        outlines = shapely.polygons(corners(boxes))
+        trees = self._tree, self._posts
+        return any(len(tree.query(outlines, "intersects")[0]) for tree in trees)
+
     def first_met(self, boxes: Rectangles, *, drives: bool) -> int | None:
         """Return the first of boxes (N,) that touches what stops who walks or cycles, or a vehicle
         that drives, which needs room beside houses."""
