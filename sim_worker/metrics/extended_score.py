@@ -15,8 +15,9 @@ from foretwin.contracts.arrays import Array, Flags, Indices
 from foretwin.geometry.frenet_path import FrenetPath
 from foretwin.sim_worker.metrics import compiled_pairs
 from foretwin.sim_worker.metrics.comfort import comfortable
+from foretwin.sim_worker.metrics.ground import reached
 from foretwin.sim_worker.metrics.lane_areas import LaneAreas
-from foretwin.sim_worker.metrics.progress import off_road, on_road
+from foretwin.sim_worker.metrics.progress import keeps_to_road, staying
 from foretwin.sim_worker.metrics.rollout import Measure, RolloutView
 from foretwin.sim_worker.metrics.score import relative_progress
 from foretwin.sim_worker.metrics.violations import red_light_violations
@@ -52,7 +53,7 @@ def extended_score(view: RolloutView) -> Measure:
     successive frames, as the published scorer leaves it out of what it says of one. No human's
     drive is known that would excuse a violation. Progress is relative to the farthest future.
     """
-    gates = no_at_fault(view).values * on_road(view).values
+    gates = no_at_fault(view).values * keeps_to_road(view)
     gates = gates * driving_direction(view).values * traffic_lights(view).values
     parts = (
         (PROGRESS_WEIGHT, relative_progress(view, gates)),
@@ -101,7 +102,7 @@ def time_to_collision_kept(view: RolloutView) -> Measure:
 def driving_direction(view: RolloutView) -> Measure:
     """DDC (S,): 1 with less than 2 m in a second outside the lanes of the route, ½ below 6 m, or 0.
 
-    Junctions do not count.
+    Junctions do not count, nor what lies beyond the World's edge.
     """
     lanes, centre = _lanes(view), view.centre_m
     moved = np.zeros(view.states.shape[:2])
@@ -111,7 +112,8 @@ def driving_direction(view: RolloutView) -> Measure:
     if len(far):
         points = centre.reshape(-1, 2)[far]
         route = lanes.route(_path(view))
-        astray[far] = ~lanes.on_route(points, route) & ~lanes.in_junction(points)
+        known = reached(lanes.world, points[:, 0], points[:, 1]) & ~lanes.in_junction(points)
+        astray[far] = known & ~lanes.on_route(points, route)
     total = np.cumsum(moved * astray.reshape(moved.shape), axis=1)
     steps = int(ONCOMING_S / _step_s(view) + 1e-9)
     before = np.zeros_like(total)
@@ -198,7 +200,7 @@ def _front_touches(view: RolloutView, at: Overlaps) -> Flags:
 
 def _astray(view: RolloutView, future: Indices, instant: Indices) -> Flags:
     """Return whether the ego is in several lanes, or a corner off the road, at (K,) instants."""
-    astray = view.keep(off_road)[future, instant]
+    astray = view.keep(staying).off[future, instant]
     if len(future):
         cos, sin = (values[future, instant] for values in view.heading)
         ahead = np.stack([cos, sin], axis=-1) * view.half_length_m

@@ -23,7 +23,7 @@ class LaneAreas:
     """The lanes and connections of a World as strips of their width, and its junctions' areas."""
 
     def __init__(self, world: World) -> None:
-        self._world = world
+        self.world = world
         self._ways: list[Lane | Connection] = [*world.lanes, *world.connections]
         self._strips = np.array([_strip(way) for way in self._ways], dtype=object)
         self._tree = shapely.STRtree(self._strips)
@@ -35,7 +35,7 @@ class LaneAreas:
     @functools.cached_property
     def lookup(self) -> LaneLookup:
         """The one lane or connection on which each of many points is."""
-        return LaneLookup(self._world)
+        return LaneLookup(self.world)
 
     def in_junction(self, points: Array) -> Flags:
         """Return whether points (K, 2) lie in a junction (K,)."""

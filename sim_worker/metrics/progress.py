@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from foretwin.contracts.arrays import Array, Flags
+from foretwin.sim_worker.metrics.ground import reached
 from foretwin.sim_worker.metrics.rollout import Measure, RolloutView
 
 _LOOK_AGAIN_M = 10.0
@@ -44,26 +47,39 @@ def arc_along_path(view: RolloutView) -> Array:
 
 
 def off_road_share(view: RolloutView) -> Measure:
-    """Share of the instants (S,) at which a corner of the ego is off the drivable ground.
+    """Share of the instants (S,) at which a corner of the ego is off the drivable ground, of those
+    at which all lie within the World.
 
     The ground is 0.3 m wider than drawn: nuPlan, drivable_area_compliance.
     """
-    off = view.keep(off_road)
-    share: Array = np.empty(len(off))
-    np.mean(off, axis=1, out=share)
-    return view.measure(share)
+    stays = view.keep(staying)
+    known = np.count_nonzero(stays.known, axis=1)
+    share = np.count_nonzero(stays.off, axis=1) / np.maximum(known, 1)
+    return view.measure(share, known > 0)
 
 
 def on_road(view: RolloutView) -> Measure:
-    """Whether all corners stay on drivable ground at all instants (S,): 1 or 0."""
-    return view.measure((~np.asarray(view.keep(off_road).any(axis=1))).astype(np.float64))
+    """Whether all corners stay on drivable ground at all instants (S,) within the World: 1 or 0."""
+    known = np.asarray(view.keep(staying).known.any(axis=1))
+    return view.measure(keeps_to_road(view), known)
 
 
-def off_road(view: RolloutView) -> Flags:
-    """Return at which instants (S, N) a corner of the ego is off the drivable ground.
+def keeps_to_road(view: RolloutView) -> Array:
+    """Return 0 for futures (S,) that leave the drivable ground, else 1: beyond the World's edge
+    nothing is known to be left."""
+    return np.asarray(1.0 - view.keep(staying).off.any(axis=1))
 
-    Raises ValueError where there is no World.
-    """
+
+class Staying(NamedTuple):
+    """At which instants (S, N) all corners of the ego lie within the World, and at which of these
+    one is off the drivable ground."""
+
+    known: Flags
+    off: Flags
+
+
+def staying(view: RolloutView) -> Staying:
+    """Return where futures stay; raises ValueError where there is no World."""
     ground = view.context.ground
     if ground is None:
         raise ValueError("drivable area: no World given")
@@ -73,4 +89,5 @@ def off_road(view: RolloutView) -> Flags:
     left_x, left_y = -view.half_width_m * sin, view.half_width_m * cos
     corners_x = np.stack([x + a * ahead_x + b * left_x for a, b in _CORNERS])
     corners_y = np.stack([y + a * ahead_y + b * left_y for a, b in _CORNERS])
-    return np.asarray(~ground.contains(corners_x, corners_y).all(axis=0))
+    known = np.asarray(reached(ground.world, corners_x, corners_y).all(axis=0))
+    return Staying(known, known & ~np.asarray(ground.contains(corners_x, corners_y).all(axis=0)))

@@ -7,7 +7,7 @@ import numpy as np
 from foretwin.contracts.arrays import Array
 from foretwin.sim_worker.metrics.comfort import comfortable
 from foretwin.sim_worker.metrics.impact import at_fault_collision
-from foretwin.sim_worker.metrics.progress import backwards, on_road, progress
+from foretwin.sim_worker.metrics.progress import backwards, keeps_to_road, progress
 from foretwin.sim_worker.metrics.rollout import Measure, RolloutView
 from foretwin.sim_worker.metrics.time_to_collision import ttc
 
@@ -30,7 +30,7 @@ def driving_score(view: RolloutView) -> Measure:
     is that of `ttc`; and it spans the rollout's horizon instead of 4 s. Needs a World and a path.
     """
     gates = 1.0 - at_fault_collision(view).values
-    gates = gates * on_road(view).values
+    gates = gates * keeps_to_road(view)
     back = backwards(view).values
     gates = gates * np.where(back <= _BACK_M[0], 1.0, np.where(back <= _BACK_M[1], 0.5, 0.0))
     ratio = relative_progress(view, np.where(gates > 0.0, 1.0, 0.0))

@@ -17,7 +17,7 @@ from foretwin.contracts.world import Area
 from foretwin.geometry.frenet_path import FrenetPath
 from foretwin.sim_worker.metrics import comfort
 from foretwin.sim_worker.metrics.evaluation import COMPUTED, computable, evaluate
-from foretwin.sim_worker.metrics.ground import DrivableGround
+from foretwin.sim_worker.metrics.ground import DrivableGround, reached
 from foretwin.sim_worker.metrics.rollout import Context, Rollout
 from foretwin.sim_worker.metrics.route_rules import RouteRules
 from foretwin.sim_worker.metrics.table import METRICS
@@ -119,6 +119,31 @@ def test_ground_beyond_the_tolerance_and_islands_are_not_driven_on() -> None:
     assert ground.contains(x, y).tolist() == expected
     assert ground.contains(x, y).tolist() == expected
     assert ground.contains(x[::-1], y[::-1]).tolist() == expected[::-1]
+
+
+def test_beyond_the_worlds_edge_nobody_is_off_the_road() -> None:
+    """Streets and World end 150 m out; at 10 m/s the car is beyond after 1, 4 or 0 s of 8 s."""
+    given = context()
+    leaves, astray, beyond = (
+        rollout(Mover(*at, 0, 10.0)) for at in ((140, 0), (110, 9), (200, -3))
+    )
+
+    assert value(leaves, "off_road_share", given) == 0.0
+    assert value(leaves, "on_road", given) == 1.0
+    assert value(astray, "off_road_share", given) == 1.0
+    assert value(astray, "on_road", given) == 0.0
+    assert math.isnan(value(beyond, "off_road_share", given))
+    assert math.isnan(value(beyond, "on_road", given))
+    for name in ("driving_score", "epdms"):
+        assert value(astray, name, given) == 0.0
+        assert value(beyond, name, given) > 0.5
+
+
+def test_a_world_in_a_rectangle_is_known_within_it() -> None:
+    world = msgspec.structs.replace(crossroads(), bounds_m=(-20.0, -9.0, 30.0, 9.0))
+    x, y = np.array([[-21.0, 0.0], [29.0, 0.0], [31.0, 0.0], [0.0, -8.0], [0.0, 9.5]]).T
+
+    assert reached(world, x, y).tolist() == [False, True, False, True, False]
 
 
 def test_look_up_says_what_the_polygon_says() -> None:
