@@ -174,7 +174,9 @@ class FuturesWorker:
     def _prepare(self, question: msgspec.Struct) -> PrepareReply:
         assert isinstance(question, PrepareRequest)
         start = time.perf_counter()
-        warm_up(self._stages.get(question.world_id).stage)
+        prepared = self._stages.get(question.world_id)
+        warm_up(prepared.stage)
+        prepared.scenes.warm_up()
         return PrepareReply(
             world_id=question.world_id,
             worker_id=self._id,

@@ -109,6 +109,12 @@ class SceneMaker:
     def _walls(self) -> OpaqueGrid | None:
         return opaque_grid(self.world)
 
+    def warm_up(self) -> None:
+        """Make what the first jobs would make of the World alone, before they come."""
+        for junction in self.world.junctions:
+            self.network.passages(junction.summary.id)
+        _ = self.network.walls, self._walls, self.drivable, self.lanes
+
     def scene(
         self,
         job: Job,

@@ -217,6 +217,7 @@ def test_a_worker_takes_its_worlds_from_wherever_it_is_told(tmp_path: Path) -> N
     answer = worker.answer("prepare", PrepareRequest(world_id="from afar"))
     assert isinstance(answer, PrepareReply)
     assert answer.world_id == "from afar"
+    assert "drivable" in vars(worker._stages.get("from afar").scenes), "before the first job"
 
 
 @pytest.mark.parametrize("world_id", ["", "../secret", "a\\\\b", ".hidden"])

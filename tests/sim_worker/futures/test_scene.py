@@ -222,3 +222,28 @@ def test_what_a_job_needed_is_gone_with_it(stage: BatchSimulation) -> None:
         assert gc.collect() == 0, "what holds itself stays until garbage is sought"
     finally:
         gc.enable()
+
+
+def test_a_worlds_first_job_makes_nothing_that_its_scenes_have_ready(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    scenes = SceneMaker(crossroads())
+    scenes.warm_up()
+
+    def made_again(*_: object) -> None:
+        raise AssertionError("made by a job")
+
+    for where, name in (
+        ("futures.scene", "DrivableGround"),
+        ("futures.scene", "LaneAreas"),
+        ("futures.scene", "opaque_grid"),
+        ("scenarios.roads", "Walls"),
+    ):
+        monkeypatch.setattr(f"foretwin.sim_worker.{where}.{name}", made_again)
+    asked = msgspec.structs.replace(
+        job((happening(0, "occluded_pedestrian"),)), metrics=("on_road", "epdms")
+    )
+    stage = BatchSimulation(crossroads(), CAR, nsim=1)
+    assert run_job(asked, stage, scenes=scenes).metrics["on_road"] == 1.0
+    with pytest.raises(AssertionError, match="made by a job"):
+        run_job(asked, stage, scenes=SceneMaker(crossroads()))
