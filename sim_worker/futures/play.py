@@ -140,7 +140,7 @@ class Play:
             self._lead = scene.sight.lead(seen, place)
         if scene.limit_share is not None:
             share = scene.path.at_nodes(scene.limit_share, place.arc_m)
-            target, rising = target * share, None if rising is None else rising * share
+            target = target * share
         if self._red.shape[-1]:
             lines = self._red[..., 0, :]
             passed = lines < (place.arc_m + self.front_m)[:, None]

@@ -205,6 +205,7 @@ class SceneMaker:
                 tick_s=tick_s,
                 walls=self._walls,
             )
+        told = bool(staged) or aims.speed_ahead_mps is not None
         return JobScene(
             path=path,
             starts=starts,
@@ -213,8 +214,8 @@ class SceneMaker:
             bend_accel_mps2=bend_accel_of(job),
             planners=tuple(future.planner for future in job.futures),
             numbers=numbers,
-            # Staged, a case says how fast the ego drives.
-            limit_share=None if staged else limit_share(path, float(place.arc_m[0])),
+            # Staged, a case says how fast the ego drives; speeds ahead are those of the limits.
+            limit_share=None if told else limit_share(path, float(place.arc_m[0])),
             traffic=traffic,
             sight=sight,
             rules=rules,

@@ -6,7 +6,7 @@ import msgspec
 import numpy as np
 import pytest
 
-from foretwin.contracts.futures import Future, PathAhead
+from foretwin.contracts.futures import Future
 from foretwin.sim_worker.batch.batch_simulation import BatchSimulation
 from foretwin.sim_worker.futures.run_job import run_job
 from foretwin.sim_worker.vehicle.parameters import load_vehicle
@@ -53,6 +53,20 @@ def test_speeds_ahead_that_stay_are_the_cruise_speed(stage: BatchSimulation) -> 
     )
 
 
+def test_lower_limits_slow_a_cruise_speed_and_not_speeds_ahead_which_know_them(
+    stage: BatchSimulation,
+) -> None:
+    way = straight_path()
+    limits = np.where(way.xy_m[:, 0] < -20.0, 14.0, 7.0)
+    path = msgspec.structs.replace(way, speed_limit_mps=limits)
+    asked = job((Future(index=0, name="n"),), path=path, state=state_at(-50.0, -1.5, speed=8.0))
+    told = msgspec.structs.replace(asked, speed_ahead_mps=np.full(17, 8.0))
+    slowed, as_told = (run_job(one, stage).trajectory.states[0, :, 3] for one in (asked, told))
+
+    np.testing.assert_allclose(slowed[[20, -1]], [8.0, 4.0], atol=0.3)
+    np.testing.assert_allclose(as_told, 8.0, atol=0.3)
+
+
 @pytest.mark.parametrize("ahead", [[], [8.0, float("nan")]])
 def test_speeds_ahead_that_are_none_are_refused(ahead: list[float], stage: BatchSimulation) -> None:
     told = msgspec.structs.replace(
@@ -60,51 +74,4 @@ def test_speeds_ahead_that_are_none_are_refused(ahead: list[float], stage: Batch
     )
 
     with pytest.raises(ValueError, match="speed_ahead_mps needs speeds"):
-        run_job(told, stage)
-
-
-def test_where_the_limit_drops_speeds_ahead_rise_by_its_share(stage: BatchSimulation) -> None:
-    path = straight_path()
-    limit = np.where(path.xy_m[:, 0] < -45.0, 14.0, 7.0)
-    told = msgspec.structs.replace(
-        job((Future(index=0, name="n"),), state=state_at(-50.0, -1.5, speed=4.0)),
-        path=PathAhead(xy_m=path.xy_m, speed_limit_mps=limit),
-        speed_ahead_mps=np.linspace(4.0, 20.0, 17),
-    )
-    speed = run_job(told, stage).trajectory.states[0, :, 3]
-
-    np.testing.assert_allclose(speed[40:70], 0.5 * (4.0 + 0.2 * np.arange(40, 70)), atol=0.25)
-
-
-def bend_path(radius_m: float) -> PathAhead:
-    """East for 40 m from where cars begin, then a half circle to the left."""
-    turned = np.linspace(0.0, np.pi, 90)[1:]
-    arc = radius_m * np.stack([np.sin(turned), 1.0 - np.cos(turned)], axis=-1) + [-10.0, -1.5]
-    straight = np.stack([np.arange(-70.0, -9.5), np.full(61, -1.5)], axis=-1)
-    return PathAhead(xy_m=np.concatenate([straight, arc]), speed_limit_mps=np.full(150, 30.0))
-
-
-@pytest.mark.parametrize("planner", ["pure_pursuit_idm", "gap_acceptance"])
-def test_bends_are_taken_as_the_driver_takes_them(planner: str, stage: BatchSimulation) -> None:
-    asked = msgspec.structs.replace(
-        job((Future(index=0, name="n", planner=planner),), state=state_at(-50.0, -1.5, speed=9.0)),
-        path=bend_path(25.0),
-        cruise_speed_mps=12.0,
-    )
-    across = {}
-    for own in (msgspec.UNSET, 2.5, 1.5, 3.5):
-        told = msgspec.structs.replace(asked, bend_accel_mps2=own)
-        speed = run_job(told, stage).trajectory.states[0, :, 3]
-        across[own] = float(speed[60]) ** 2 / 25.0
-    assert across[msgspec.UNSET] == across[2.5]
-    for own in (1.5, 2.5, 3.5):
-        assert across[own] == pytest.approx(own, rel=0.1)
-
-
-@pytest.mark.parametrize("own", [0.0, -1.0, float("nan"), float("inf")])
-def test_what_is_taken_in_bends_has_to_be_a_number_above_0(
-    own: float, stage: BatchSimulation
-) -> None:
-    told = msgspec.structs.replace(job((Future(index=0, name="n"),)), bend_accel_mps2=own)
-    with pytest.raises(ValueError, match="bend_accel_mps2 is to be above 0 and finite, not"):
         run_job(told, stage)
