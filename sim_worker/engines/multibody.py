@@ -13,15 +13,15 @@ import numpy as np
 from foretwin.contracts.arrays import Array, Indices
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.geometry.compiled import IN, OUT, OUT_ROWS, REAL, kernel, types
-from foretwin.sim_worker.engines.engine import Demand, Seeds
-from foretwin.sim_worker.engines.multibody_car import multibody_car
-from foretwin.sim_worker.engines.multibody_equations import (
+from foretwin.geometry.multibody_equations import (
     BODY_TYPE,
     GRAVITY_MPS2,
     STATES,
     TYRE_TYPE,
     slope,
 )
+from foretwin.sim_worker.engines.engine import Demand, Seeds
+from foretwin.sim_worker.engines.multibody_car import multibody_car
 from foretwin.sim_worker.vehicle.timestep import TIMESTEP_S
 
 _SLOW_MPS, _ROLLING_MPS = 0.8, 1.0

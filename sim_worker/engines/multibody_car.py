@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 from vehiclemodels.parameters_vehicle2 import parameters_vehicle2
 
 from foretwin.contracts.vehicle import VehicleParameters
-from foretwin.sim_worker.engines.multibody_equations import BODY, GRAVITY_MPS2, TYRE
+from foretwin.geometry.multibody_equations import BODY, GRAVITY_MPS2, TYRE
 
 _BY_MASS = "m_s m_uf m_ur K_sf K_sdf K_sr K_sdr K_ras K_rad K_zt"
 _BY_MASS_AND_TRACK = "I_Phi_s K_tsf K_tsr I_uf I_ur"

@@ -12,10 +12,9 @@ from typing import NamedTuple
 import numpy as np
 from vehiclemodels.init_mb import init_mb
 from vehiclemodels.parameters_vehicle2 import parameters_vehicle2
-from vehiclemodels.vehicle_dynamics_mb import vehicle_dynamics_mb
 
-from foretwin.contracts.arrays import Array
 from foretwin.geometry.steering import SteeringColumn
+from foretwin.telemetry.standin.multi_body_steps import car_numbers, runge_kutta
 from foretwin.telemetry.standin.parameters import CarParameters
 
 STEP_S = 0.005
@@ -99,6 +98,7 @@ class MultiBodyCar:
         self._column = SteeringColumn(parameters.steering_ratio, parameters.steering_offset_rad)
         self._gives = parameters.steering_compliance_rad_per_mps2 != 0.0
         self._model.tire.p_ky1 = self._own_stiffness * parameters.tyre_stiffness
+        self._numbers = car_numbers(self._model)
 
     def _place(self, x: float, y: float, yaw: float, speed: float, angle: float) -> None:
         """Put the centre of gravity at (x, y), rolling; `speed` is the rear axle's."""
@@ -164,18 +164,9 @@ class MultiBodyCar:
         )
 
     def _step_multi_body(self, rate: float, accel: float) -> None:
-        def slope(at: Array) -> Array:
-            return np.array(vehicle_dynamics_mb(at.tolist(), [rate, accel], self._model))
-
         state = np.array(self._state)
         steps = 1 if state[_VX] > _FAST_MPS else _STEPS_BELOW_FAST
-        dt = STEP_S / steps
-        for _ in range(steps):
-            k1 = slope(state)
-            k2 = slope(state + 0.5 * dt * k1)
-            k3 = slope(state + 0.5 * dt * k2)
-            k4 = slope(state + dt * k3)
-            state = state + dt / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4)
+        runge_kutta(state, rate, accel, steps, STEP_S / steps, *self._numbers)
         if not np.isfinite(state).all():
             raise ArithmeticError("the stand-in's multi-body model diverged")
         self._state = state.tolist()

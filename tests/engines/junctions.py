@@ -16,12 +16,12 @@ from foretwin.contracts.futures import EngineName, Job, PathAhead
 from foretwin.contracts.runner import JobRequest
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.contracts.world import World
+from foretwin.geometry.multibody_equations import BODY, TYRE
 from foretwin.geometry.polyline import headings_rad
 from foretwin.orchestrator.config import DriveConfig
 from foretwin.orchestrator.rounds.probe import probe_task
 from foretwin.sim_worker.engines import multibody
 from foretwin.sim_worker.engines.multibody_car import MultiBodyNumbers, multibody_car
-from foretwin.sim_worker.engines.multibody_equations import BODY, TYRE
 from foretwin.sim_worker.engines.registry import trouble_with_engine
 from foretwin.sim_worker.futures.run_job import run_alone
 from foretwin.sim_worker.vehicle.parameters import load_vehicle

@@ -8,8 +8,8 @@ from vehiclemodels.parameters_vehicle2 import parameters_vehicle2
 from vehiclemodels.vehicle_dynamics_mb import vehicle_dynamics_mb
 
 from foretwin.contracts.arrays import Array
+from foretwin.geometry.multibody_equations import BODY, FIRST_WHEEL, STATES, TYRE, slope
 from foretwin.sim_worker.engines.multibody import begin
-from foretwin.sim_worker.engines.multibody_equations import BODY, FIRST_WHEEL, STATES, TYRE, slope
 
 MODEL: Any = parameters_vehicle2()
 BODY_OF_320I = tuple(float(getattr(MODEL, name)) for name in BODY)
