@@ -61,6 +61,12 @@ class ReplaySource:
                 yield sample
 
     @property
+    def next_stamp_ns(self) -> int:
+        """The stamp of the next sample; that of the beginning once there is none."""
+        sample = self._next_sample
+        return self.first_stamp_ns if sample is None else stamp_ns_of(sample)
+
+    @property
     def ended(self) -> bool:
         """Whether the last sample has been given."""
         return self._next_sample is None

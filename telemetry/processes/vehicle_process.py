@@ -21,12 +21,12 @@ from foretwin.contracts.process import ProcessLife
 from foretwin.contracts.trace import traced
 from foretwin.telemetry.anchored import world_from_lot_info, world_from_lot_message
 
-_TICK_S = 0.005
-"""Between two looks at the clock: what a sample may be late."""
+_LATE_S = 0.005
+"""What a sample may be late, so that those close to each other leave together."""
 _MOST_AT_ONCE_NS = 200_000_000
 _IDLE_S = 0.2
-_BEGIN_S = 0.02
-"""Between two looks whether the orchestrator is there."""
+_LOOK_S = 0.02
+"""Between two looks whether the orchestrator is there, or the run over."""
 
 log = logging.getLogger("telemetry.vehicle")
 
@@ -41,6 +41,10 @@ class VehicleSource(Protocol):
     @property
     def first_stamp_ns(self) -> int:
         """Where the drive begins: the stamp that the clock starts at."""
+
+    @property
+    def next_stamp_ns(self) -> int:
+        """When the next sample is due; once `ended`, of no meaning."""
 
     @property
     def ended(self) -> bool:
@@ -112,7 +116,8 @@ class VehicleProcess:
 
     def step(self) -> bool:
         """Answer what was asked, publish what is due, wait a moment; return False to leave."""
-        item = self._mailbox.take(self._wait_s())
+        self._mailbox.gather(self._wait_s())
+        item = self._mailbox.take()
         while item is not None:
             self._answer(item)
             item = self._mailbox.take()
@@ -136,8 +141,11 @@ class VehicleProcess:
         if self._speed is None or self._end_sent:
             return _IDLE_S
         if self._started_s is None:
-            return _BEGIN_S
-        return 0.0 if self._behind else _TICK_S
+            return _LOOK_S
+        if self._behind:
+            return 0.0
+        ahead_ns = self._source.next_stamp_ns - self._now_ns(self._started_s, self._speed)
+        return min(max(ahead_ns / self._speed * 1e-9, _LATE_S), _LOOK_S)
 
     def _answer(self, item: Any) -> None:
         match item:

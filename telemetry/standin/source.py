@@ -22,6 +22,8 @@ START_STAMP_NS = 1_767_225_600_000_000_000
 """2026-01-01T00:00:00Z: every stand-in drive begins then, so that its stamps repeat."""
 _TICK_NS = round(STEP_S * 1e9)
 _CONTROL_TICKS = round(0.020 / STEP_S)
+_PERIOD_NS = {channel: period_ms * 1_000_000 for channel, period_ms in PERIOD_MS.items()}
+_SOONEST_NS = math.gcd(*_PERIOD_NS.values())
 
 
 class StandinSource:
@@ -96,8 +98,8 @@ class StandinSource:
 
     @property
     def next_stamp_ns(self) -> int:
-        """When the next samples may be due."""
-        return START_STAMP_NS + self._tick * _TICK_NS
+        """When the next sample is due."""
+        return START_STAMP_NS - (-self._tick * _TICK_NS // _SOONEST_NS) * _SOONEST_NS
 
     @property
     def ahead(self) -> Hindrance | None:
@@ -122,7 +124,9 @@ class StandinSource:
 
     def advance(self, until_stamp_ns: int) -> Iterator[tuple[str, Any]]:
         """Simulate up to and including the stamp; yield every sample once, in stamp order."""
-        while not self.ended and (stamp_ns := self.next_stamp_ns) <= until_stamp_ns:
+        until_ns = until_stamp_ns - START_STAMP_NS
+        while not self.ended and (elapsed_ns := self._tick * _TICK_NS) <= until_ns:
+            stamp_ns = START_STAMP_NS + elapsed_ns
             motion = self._car.motion()
             if self._path.altitude_m is not None:
                 s_m = self._driver.s_m
@@ -143,9 +147,7 @@ class StandinSource:
                 self._command = self._driver.command(motion)
             # Time goes on before samples leave: a caller may stop between two of them.
             due = [
-                channel
-                for channel, period_ms in PERIOD_MS.items()
-                if self._tick * _TICK_NS % (period_ms * 1_000_000) == 0
+                channel for channel, period_ns in _PERIOD_NS.items() if elapsed_ns % period_ns == 0
             ]
             samples = [(channel, self._sample(channel, stamp_ns, motion)) for channel in due]
             self._car.step(

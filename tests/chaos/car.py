@@ -48,6 +48,11 @@ class ErraticSource:
             pass
 
     @property
+    def next_stamp_ns(self) -> int:
+        """When the next sample is due."""
+        return self._source.next_stamp_ns
+
+    @property
     def ended(self) -> bool:
         """Whether the last sample has been given."""
         return self._source.ended

@@ -62,6 +62,10 @@ class _Ahead:
         self.skipped_invalid = 0
 
     @property
+    def next_stamp_ns(self) -> int:
+        return self._source.next_stamp_ns + self._ahead_ns
+
+    @property
     def ended(self) -> bool:
         return self._source.ended
 

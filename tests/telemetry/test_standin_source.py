@@ -86,6 +86,14 @@ def test_the_same_seed_gives_the_same_bytes_however_it_is_asked() -> None:
     assert first_seconds(400_000_000, 7) != first_seconds(400_000_000, 8)
 
 
+def test_it_says_when_its_next_sample_is_due() -> None:
+    source = new_source()
+    for _ in range(30):
+        due_ns = source.next_stamp_ns
+        assert list(source.advance(due_ns - 1)) == []
+        assert {message.stamp_ns for _, message in source.advance(due_ns)} == {due_ns}
+
+
 def test_gnss_is_the_antenna_with_the_stated_noise() -> None:
     source, samples = whole_drive()
     lever = read_parameters().sensors.body_from_antenna_m

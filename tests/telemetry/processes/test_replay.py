@@ -50,8 +50,10 @@ def stamps(source: ReplaySource, until_s: float) -> list[float]:
 
 def test_it_gives_everything_once_up_to_and_including_the_stamp() -> None:
     source = ReplaySource(recorded_minute(), vehicle_id="car")
+    assert source.next_stamp_ns == START_NS
     assert stamps(source, 1.0) == [0.0, 0.0, 0.5, 1.0, 1.0]
     assert stamps(source, 1.0) == []
+    assert source.next_stamp_ns == START_NS + 1.5 * SECOND_NS
     assert stamps(source, 1.9) == [1.5]
     assert not source.ended
     assert stamps(source, 100.0)[-1] == 60.0

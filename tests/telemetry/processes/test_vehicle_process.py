@@ -111,6 +111,41 @@ def test_a_pause_is_caught_up_in_portions_that_leave_time_for_questions() -> Non
     assert rig.seconds() == [0.5, 1.0, 1.0, 1.5, 2.0, 2.0]
 
 
+def test_it_sleeps_until_the_next_sample_is_due_and_looks_now_and_then_in_a_gap(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    rig = Rig(speed=2.0)
+    rig.bus.declare_alive(ORCHESTRATOR)
+    rig.process.step()
+    assert rig.seconds() == [0.0, 0.0]
+    slept_s: list[float] = []
+
+    def sleep(_: Mailbox, most_s: float) -> None:
+        slept_s.append(most_s)
+        rig.now_s += most_s
+
+    monkeypatch.setattr(Mailbox, "gather", sleep)
+    while rig.process.published["speed"] != 3:
+        rig.process.step()
+    assert rig.seconds() == [0.5, 1.0, 1.0]
+    assert rig.now_s == pytest.approx(100.0 + 1.0 / 2.0)
+    assert slept_s[:12] == [0.02] * 12
+    assert len(slept_s) == 2 * 13
+
+
+def test_samples_that_follow_close_on_each_other_leave_together(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    rig = Rig(speed=500.0)
+    rig.bus.declare_alive(ORCHESTRATOR)
+    rig.process.step()
+    rig.seconds()
+    slept_s: list[float] = []
+    monkeypatch.setattr(Mailbox, "gather", lambda _, most_s: slept_s.append(most_s))
+    rig.process.step()
+    assert slept_s == [0.005]
+
+
 def test_lock_step_publishes_before_it_answers() -> None:
     rig = Rig(speed=None)
     rig.bus.declare_alive(ORCHESTRATOR)
