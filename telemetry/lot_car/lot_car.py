@@ -104,7 +104,7 @@ class LotCar:
         """Whether the path is at its end."""
         return self._source.ended
 
-    def step(self, wait_s: float = 0.005) -> None:
+    def step(self, wait_s: float = 0.02) -> None:
         """Wait for a list of objects, no longer than until samples are due; drive, and say them."""
         due_in_ns = self._source.next_stamp_ns - self._stamp_ns(self._mono_ns())
         item: Any = self._inbox.take(min(wait_s, max(0.0, due_in_ns * 1e-9)))

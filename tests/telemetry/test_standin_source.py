@@ -17,7 +17,6 @@ from tests.telemetry.standin_drive import FRAME, STOP_AT_M, new_source, whole_dr
 
 COVERS = (
     "foretwin.telemetry.standin.parameters",
-    "foretwin.telemetry.standin.path",
     "foretwin.telemetry.standin.sensors",
     "foretwin.telemetry.standin.source",
 )

@@ -282,7 +282,7 @@ def test_it_says_its_samples_as_they_are_due_not_as_its_turn_ends():
     meeting.wire.now_ns += 3 * MS
     for _ in range(4):
         meeting.car.step()
-    assert waited_s == pytest.approx([0.0, 0.002, 0.005, 0.005])
+    assert waited_s == pytest.approx([0.0, 0.007, 0.010, 0.010])
 
 
 def test_a_mapping_that_sends_the_car_no_objects_is_refused():
