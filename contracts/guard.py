@@ -193,13 +193,18 @@ def _check(value: Any, name: str, *, finite: bool) -> None:
 
 
 def _fits(value: Any, far: float) -> bool:
-    """Whether a value is a plain number within its bound, or some; NaN is not."""
+    """Whether a value is a plain number within its bound, or some, or a truth; NaN is not."""
     kind = type(value)
     if kind is float:
         return bool(-far <= value <= far)
     if kind is int:
         return bool(-MOST_INTEGER <= value <= MOST_INTEGER)
-    return kind is tuple and all(type(one) is float and -far <= one <= far for one in value)
+    if kind is tuple:
+        for one in value:  # noqa: SIM110  a generator costs more than all it looks at
+            if type(one) is not float or not -far <= one <= far:
+                return False
+        return True
+    return kind is bool
 
 
 @functools.cache

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import functools
 from collections import Counter
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 
 import msgspec
 
@@ -48,7 +48,8 @@ class Numbering(msgspec.Struct):
 
     def go_on(self, seq: int, sent_ns: int) -> None:
         """Take a number that is not behind."""
-        self.reach(seq)
+        if seq > self.next:
+            self.reach(seq)
         self.next = seq + 1
         self.newest_sent_ns = max(self.newest_sent_ns, sent_ns)
 
@@ -118,7 +119,7 @@ class Numberings(msgspec.Struct):
         """
         if sender:
             sent_ns = 0
-        lives = dict(self._lives(channel, sender))
+        lives = self._lives(channel, sender)
         if len(lives) == 1:  # nearly all there are: the next one of its only numbering
             ((name, one),) = lives.items()
             if seq == one.next:
@@ -156,14 +157,13 @@ class Numberings(msgspec.Struct):
 
     def reach(self, channel: str, count: int, *, sender: int | str = 0) -> None:
         """Count as missing what has not come of the first `count` messages of a sender."""
-        lives = list(self._lives(channel, sender))
-        name = lives[-1][0] if lives else self._begin(channel, sender, 0)
+        lives = [*self._lives(channel, sender)]
+        name = lives[-1] if lives else self._begin(channel, sender, 0)
         self.streams[name].reach(count)
 
-    def _lives(self, channel: str, sender: int | str) -> Iterator[tuple[str, Numbering]]:
-        for name in _names(channel, sender):
-            if (found := self.streams.get(name)) is not None:
-                yield name, found
+    def _lives(self, channel: str, sender: int | str) -> dict[str, Numbering]:
+        streams = self.streams
+        return {name: streams[name] for name in _names(channel, sender) if name in streams}
 
     def _begin(self, channel: str, sender: int | str, seq: int) -> str:
         """Begin a numbering in the place of a sender's oldest one; returns its name."""

@@ -59,23 +59,22 @@ class Trail(NamedTuple):
 
     def gone_on(self, time_s: float, rate: float) -> Trail:
         """Return the trail gone on by a rate, evenly from the one before."""
-        value = self.value
-        if self._joins(time_s):
-            value += 0.5 * (self.rate + rate) * (time_s - self.time_s)
+        if not self._joins(time_s):
+            return Trail(((time_s, self.value),), time_s, rate, self.value)
+        value = self.value + 0.5 * (self.rate + rate) * (time_s - self.time_s)
         return Trail(self._marked(time_s, value), time_s, rate, value)
 
     def turned_to(self, time_s: float, angle_rad: float) -> Trail:
         """Return the trail gone on by an angle, the short way round."""
         value = self.value + math.remainder(angle_rad - self.value, math.tau)
-        return Trail(self._marked(time_s, value), time_s, 0.0, value)
+        marks = self._marked(time_s, value) if self._joins(time_s) else ((time_s, value),)
+        return Trail(marks, time_s, 0.0, value)
 
     def _joins(self, time_s: float) -> bool:
         return 0.0 <= time_s - self.time_s <= _GAP_S
 
     def _marked(self, time_s: float, value: float) -> tuple[tuple[float, float], ...]:
         marks = self.marks
-        if not self._joins(time_s):
-            return ((time_s, value),)
         if time_s - marks[-1][0] < _MARK_S:
             return marks
         kept = marks[1:] if time_s - marks[0][0] > _KEPT_S else marks

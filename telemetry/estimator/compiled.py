@@ -129,3 +129,9 @@ def correct(mean: Array, covariance: Array, row: Array, residual: float, std: fl
         for k in range(size):
             covariance[i, k] -= cross[i] * (cross[k] / variance)
     return variance
+
+
+@kernel(types.boolean, OUT_ROWS)
+def spreads_are_any(covariance: Array) -> bool:
+    """Return whether all variances of a covariance (N, N) are some; NaN is none."""
+    return bool(np.all(np.diag(covariance) >= 0.0))

@@ -81,12 +81,12 @@ class KinematicFilter:
         A sensor that is wrong beyond all noise, such as a yaw rate in degrees, can end both.
         """
         speed = self.mean.item(SPEED)
-        return abs(speed) <= MOST_SPEED_MPS and bool(self.covariance.diagonal().min() >= 0.0)
+        return abs(speed) <= MOST_SPEED_MPS and bool(compiled.spreads_are_any(self.covariance))
 
     @property
     def yaw_rate_radps(self) -> float:
         """Speed times curvature."""
-        return float(self.mean[SPEED] * self.mean[CURVATURE])
+        return self.mean.item(SPEED) * self.mean.item(CURVATURE)
 
     def predict(self, duration_s: float) -> None:
         """Move the state on by `duration_s`, in steps short enough for the linearisation."""
@@ -110,13 +110,13 @@ class KinematicFilter:
         """
         variance: float = compiled.correct(self.mean, self.covariance, row, residual, std)
         self._limit()
-        return LineInnovation(float(residual), max(variance - std * std, 0.0))
+        return LineInnovation(residual, max(variance - std * std, 0.0))
 
     def _limit(self) -> None:
         mean = self.mean
-        if not self.may_reverse and mean.item(SPEED) < 0.0:
-            mean[SPEED] = 0.0
         speed, curvature = mean.item(SPEED), mean.item(CURVATURE)
+        if speed < 0.0 and not self.may_reverse:
+            mean[SPEED] = speed = 0.0
         most = min(MAX_CURVATURE_PM, _HARDEST_MPS2 / max(speed * speed, 1.0))
         if abs(curvature) > most:
             mean[CURVATURE] = math.copysign(most, curvature)
@@ -234,17 +234,18 @@ class KinematicFilter:
 
     def correct_speed(self, speed_mps: float, std_mps: float) -> LineInnovation:
         """Apply a measured speed, whose scale is estimated; return how far it lay off."""
-        if self.covariance[SPEED_SCALE, SPEED_SCALE] == 0.0:
+        if self.covariance.item(SPEED_SCALE, SPEED_SCALE) == 0.0:
             self.covariance[SPEED_SCALE, SPEED_SCALE] = motion_noise.SPEED_SCALE_STD**2
         row = np.zeros(len(self.mean))
-        row[SPEED], row[SPEED_SCALE] = 1.0 + self.mean[SPEED_SCALE], self.mean[SPEED]
-        return self.correct(row, speed_mps - float(self.mean[SPEED] * row[SPEED]), std_mps)
+        speed, scale = self.mean.item(SPEED), 1.0 + self.mean.item(SPEED_SCALE)
+        row[SPEED], row[SPEED_SCALE] = scale, speed
+        return self.correct(row, speed_mps - speed * scale, std_mps)
 
     def correct_yaw(self, yaw_rad: float, std_rad: float) -> LineInnovation:
         """Apply a measured yaw in the local frame; return how far it lay off."""
         row = np.zeros(len(self.mean))
         row[YAW] = 1.0
-        return self.correct(row, math.remainder(yaw_rad - self.mean[YAW], math.tau), std_rad)
+        return self.correct(row, math.remainder(yaw_rad - self.mean.item(YAW), math.tau), std_rad)
 
     def correct_yaw_rate(
         self, rate_radps: float, std_radps: float, *, biased: bool
@@ -259,11 +260,11 @@ class KinematicFilter:
         expected = speed * curvature
         if biased:
             self._know_slip()
-            row[GYRO_BIAS] = 1.0
-            expected += self.mean[GYRO_BIAS]
-            if abs(rate_radps - self.mean[GYRO_BIAS]) < _STRAIGHT_DEVIATIONS * std_radps:
+            row[GYRO_BIAS], bias = 1.0, self.mean.item(GYRO_BIAS)
+            expected += bias
+            if abs(rate_radps - bias) < _STRAIGHT_DEVIATIONS * std_radps:
                 # Who pulls away straight on after a bend does not stand.
-                by_speed, by_curvature = (self.covariance[i, i] for i in (SPEED, CURVATURE))
+                by_speed, by_curvature = (self.covariance.item(i, i) for i in (SPEED, CURVATURE))
                 if by_speed * curvature**2 > by_curvature * speed**2:
                     row[SPEED] = 0.0
         return self.correct(row, rate_radps - expected, std_radps)
@@ -271,7 +272,7 @@ class KinematicFilter:
     def _know_slip(self) -> None:
         """Tell the body's heading from the path's: a gyro shows how they part."""
         self._slip_density = motion_noise.GYRO_SLIP_DENSITY
-        if self.covariance[SLIP, SLIP] == 0.0:
+        if self.covariance.item(SLIP, SLIP) == 0.0:
             self.mean[SLIP], std = motion_noise.SLIP_RADPMPS2
             self.covariance[SLIP, SLIP] = std * std
 
@@ -279,20 +280,21 @@ class KinematicFilter:
         """Apply a forward specific force: acceleration plus a slow bias, such as the grade's."""
         row = np.zeros(len(self.mean))
         row[ACCEL] = row[ACCEL_BIAS] = 1.0
-        self.correct(row, accel_mps2 - self.mean[ACCEL] - self.mean[ACCEL_BIAS], std_mps2)
+        mean = self.mean
+        self.correct(row, accel_mps2 - mean.item(ACCEL) - mean.item(ACCEL_BIAS), std_mps2)
 
     def correct_curvature(self, curvature_pm: float, std_pm: float) -> None:
         """Apply the curvature that the measured steering implies."""
         row = np.zeros(len(self.mean))
         row[CURVATURE] = 1.0
-        self.correct(row, curvature_pm - self.mean[CURVATURE], std_pm)
+        self.correct(row, curvature_pm - self.mean.item(CURVATURE), std_pm)
 
     def stand(self, speed_std_mps: float, accel_std_mps2: float) -> None:
         """Apply that the car stands: no speed and no acceleration; yaw stays as it is."""
         row = np.zeros(len(self.mean))
         row[SPEED] = 1.0
-        self.correct(row, -self.mean[SPEED], speed_std_mps)
+        self.correct(row, -self.mean.item(SPEED), speed_std_mps)
         row[SPEED], row[ACCEL] = 0.0, 1.0
-        self.correct(row, -self.mean[ACCEL], accel_std_mps2)
+        self.correct(row, -self.mean.item(ACCEL), accel_std_mps2)
         # What positions said of the curvature in the last moments before a stop is mostly noise.
         self.correct_curvature(0.0, _STANDING_CURVATURE_PM)

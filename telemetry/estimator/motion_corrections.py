@@ -152,7 +152,7 @@ class MotionCorrections:
                 filter_.correct_accel(accel[0], self._accel_doubt.std(abs(accel[0] - expected)))
             case HeadingSample(yaw_rad=yaw, yaw_rate_radps=yaw_rate):
                 local_yaw = yaw + convergence_rad
-                surprise = abs(math.remainder(local_yaw - filter_.mean[YAW], math.tau))
+                surprise = abs(math.remainder(local_yaw - filter_.mean.item(YAW), math.tau))
                 std = self._yaw_doubt.std(surprise, filter_.covariance.item(YAW, YAW))
                 off = filter_.correct_yaw(local_yaw, std)
                 self._surprises.take_line("heading", off, least_std=_LEAST_YAW_STD_RAD)
@@ -181,7 +181,7 @@ class MotionCorrections:
         if self._stands:
             filter_.stand(0.01, 0.05)
         else:
-            std = self._speed_doubt.std(abs(speed_mps - filter_.mean[SPEED]))
+            std = self._speed_doubt.std(abs(speed_mps - filter_.mean.item(SPEED)))
             scale_std = 0.005 * abs(speed_mps)
             self._surprises.take_line(
                 "speed",

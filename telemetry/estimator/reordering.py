@@ -19,7 +19,8 @@ _ORDER = ("imu", "heading", "speed", "steering", "gnss")
 
 
 class Sample(NamedTuple):
-    """One sample in its place: continuous stamp, rank of its channel, number of arrival."""
+    """One sample in its place: continuous stamp, rank of its channel, number of arrival, which no
+    other has, so that no two compare beyond it."""
 
     stamp_ns: int
     rank: int
@@ -94,13 +95,13 @@ class Reordering:
         rank = _ORDER.index(channel) if channel in _ORDER else len(_ORDER)
         sample = Sample(stamp_ns, rank, self._number, channel, message)
         place = len(self._samples)
-        if place and sample[:3] < self._samples[-1][:3]:
-            place = bisect.bisect(self._samples, sample[:3], key=_place)
+        if place and sample < self._samples[-1]:
+            place = bisect.bisect(self._samples, sample)
         self._samples.insert(place, sample)
         if place < self._taken or stamp_ns <= self._checkpoints[-1].stamp_ns:
             self._go_back(place)
         # A line of the map is no news of the car, only of where its newest state lies.
-        if channel != "map" and (self.newest is None or sample[:3] > self.newest[:3]):
+        if channel != "map" and (self.newest is None or sample > self.newest):
             self.newest = sample
         return True
 
@@ -158,7 +159,3 @@ class Reordering:
             self._seen.discard((sample.channel, sample.stamp_ns))
         del self._samples[:gone]
         self._taken -= gone
-
-
-def _place(sample: Sample) -> tuple[int, int, int]:
-    return sample[:3]
