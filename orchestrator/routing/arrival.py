@@ -14,7 +14,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from foretwin.contracts.arrays import Array
 from foretwin.contracts.world import Control
+from foretwin.geometry.compiled import IN, OUT, REAL, WHOLE, kernel, types
 from foretwin.orchestrator.routing.going_on import (
     FADING_S,
     LEARN_FASTER_S,
@@ -32,6 +34,9 @@ FORESEEN_S = 20.0
 SETTLING_S = 1.0
 """Time constant with which what is shown follows what is expected."""
 _STEP_S = 0.25
+_LEFT = math.exp(-_STEP_S / FADING_S)
+_PRESENT = math.sqrt(_LEFT)
+"""Of the present acceleration, what a step leaves, and what is left in the middle of the first."""
 _MOVING_MPS = 1.5
 _LEAST_SPEED_MPS = 2.0
 _CREEPING_MPS = 0.3
@@ -49,17 +54,10 @@ class BendSpeeds(NamedTuple):
     """What bends allow along the road from a position of the route on, every metre."""
 
     from_m: float
-    speed_mps: Sequence[float]
-
-    def at(self, s_m: float) -> float:
-        """Return the speed at a position, infinite where nothing is known."""
-        place = s_m - self.from_m
-        if not 0.0 <= place < len(self.speed_mps):
-            return math.inf
-        return self.speed_mps[int(place)]
+    speed_mps: Array
 
 
-STRAIGHT = BendSpeeds(0.0, ())
+STRAIGHT = BendSpeeds(0.0, np.empty(0))
 
 
 class DrivingPace:
@@ -93,39 +91,55 @@ class DrivingPace:
         """Return the expected seconds from a position of the route to later ones, in order."""
         limits = np.array([directed.speed_limit_mps.value for directed in route.edges])
         usual = np.maximum(self.share * limits, _LEAST_SPEED_MPS)
-        ends, speeds = route.start_m[1:].tolist(), usual.tolist()
-        edge = min(int(np.searchsorted(route.start_m[1:], from_m, side="right")), len(ends) - 1)
-        found: list[float] = []
-        todo = iter(places_m)
-        place = next(todo, None)
-        s_m, speed, time_s = from_m, self.speed_mps, 0.0
-        left = math.exp(-_STEP_S / FADING_S)
-        present = math.sqrt(left)
-        while place is not None and time_s < FORESEEN_S:
-            while edge < len(ends) - 1 and s_m >= ends[edge]:
-                edge += 1
-            accel = going_on_mps2(
-                speed,
-                acceleration_mps2,
-                present,
-                wanted_mps=speeds[edge],
-                within_s=UNHINDERED_S,
-                bend_mps=bends.at(s_m + CURVE_TIME_S * speed),
-            )
-            faster = max(speed + _STEP_S * accel, _CREEPING_MPS)
-            mean_mps = (speed + faster) / 2.0
-            while place is not None and place <= s_m + _STEP_S * mean_mps:
-                found.append(time_s + max(place - s_m, 0.0) / mean_mps)
-                place = next(todo, None)
-            s_m, speed, time_s = s_m + _STEP_S * mean_mps, faster, time_s + _STEP_S
-            present *= left
-        if place is not None:
-            far = np.array([place, *todo])
+        places = np.array(places_m, dtype=np.float64)
+        found = np.empty(len(places))
+        going = from_m, self.speed_mps, acceleration_mps2
+        near, s_m, time_s = _foresee(places, route.start_m[1:], usual, *bends, *going, found)
+        if far := places[near:].tolist():
             bounds = np.clip(route.start_m, s_m, None)
             bounds[-1] = max(bounds[-1], far[-1])
             arrive = time_s + np.concatenate([[0.0], np.cumsum(np.diff(bounds) / usual)])
-            found += np.interp(far, bounds, arrive).tolist()
-        return found
+            found[near:] = np.interp(far, bounds, arrive)
+        return found.tolist()
+
+
+@kernel(types.Tuple((WHOLE, REAL, REAL)), IN, IN, IN, REAL, IN, REAL, REAL, REAL, OUT)
+def _foresee(
+    places_m: Array,
+    ends_m: Array,
+    usual_mps: Array,
+    bends_from_m: float,
+    bends_mps: Array,
+    s_m: float,
+    speed: float,
+    acceleration_mps2: float,
+    found: Array,
+) -> tuple[int, float, float]:
+    """Fill `found` with the seconds to those of `places_m` (N,), in order, that come within
+    `FORESEEN_S`; return how many do, and where the car is then, and when.
+
+    `ends_m` (E,) are those of the route's edges, where `usual_mps` (E,) is driven.
+    """
+    edge, last, count = 0, len(ends_m) - 1, 0
+    time_s, present = 0.0, _PRESENT
+    while count < len(places_m) and time_s < FORESEEN_S:
+        while edge < last and s_m >= ends_m[edge]:
+            edge += 1
+        ahead_m = s_m + CURVE_TIME_S * speed - bends_from_m
+        bend_mps = math.inf  # where nothing is known
+        if 0.0 <= ahead_m < len(bends_mps):
+            bend_mps = bends_mps[int(ahead_m)]
+        accel = going_on_mps2(
+            speed, acceleration_mps2, present, usual_mps[edge], UNHINDERED_S, bend_mps
+        )
+        faster = max(speed + _STEP_S * accel, _CREEPING_MPS)
+        mean_mps = (speed + faster) / 2.0
+        while count < len(places_m) and places_m[count] <= s_m + _STEP_S * mean_mps:
+            found[count] = time_s + max(places_m[count] - s_m, 0.0) / mean_mps
+            count += 1
+        s_m, speed, time_s = s_m + _STEP_S * mean_mps, faster, time_s + _STEP_S
+        present *= _LEFT
+    return count, s_m, time_s
 
 
 class NextJunction(NamedTuple):

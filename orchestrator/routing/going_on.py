@@ -16,6 +16,7 @@ from __future__ import annotations
 
 import math
 
+from foretwin.geometry.compiled import REAL, kernel
 from foretwin.sim_worker.driver_model import CURVE_TIME_S, MAX_DECEL_MPS2, STANDING_MPS
 
 FADING_S = 3.0
@@ -40,11 +41,11 @@ def stands(speed_mps: float, acceleration_mps2: float) -> bool:
     return speed_mps < STANDING_MPS and acceleration_mps2 < PULLING_AWAY_MPS2
 
 
+@kernel(REAL, REAL, REAL, REAL, REAL, REAL, REAL)
 def going_on_mps2(
     speed_mps: float,
     present_mps2: float,
     present: float,
-    *,
     wanted_mps: float,
     within_s: float,
     bend_mps: float,
@@ -58,6 +59,4 @@ def going_on_mps2(
     if wanted_mps != math.inf:
         accel += (1.0 - present) * (wanted_mps - speed_mps) / within_s
     bend_mps2 = (bend_mps - speed_mps) / CURVE_TIME_S
-    if bend_mps2 < accel:  # min and max would cost as much as all the rest
-        accel = bend_mps2
-    return accel if accel > -MAX_DECEL_MPS2 else -MAX_DECEL_MPS2
+    return max(min(accel, bend_mps2), -MAX_DECEL_MPS2)

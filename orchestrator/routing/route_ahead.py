@@ -251,5 +251,5 @@ class WayAhead:
                 geometry.xy_m, stamp_ns=self._stamp_ns, car_xy_m=self._xy_m
             )
         self._speeds = way_speeds(path, driven_mps, speed_mps=self._cruise.speed_mps)
-        self._bends = BendSpeeds(self.s_m, self._speeds.bend_mps)
+        self._bends = BendSpeeds(self.s_m, np.array(self._speeds.bend_mps))
         return path

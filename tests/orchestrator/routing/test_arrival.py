@@ -75,7 +75,7 @@ def test_a_car_that_brakes_comes_later_and_one_that_gains_earlier() -> None:
 
 def test_bends_that_are_known_take_their_time() -> None:
     pace = pace_at(USUAL_MPS)
-    bends = BendSpeeds(0.0, [*np.full(60, 20.0), *np.full(20, 4.0), *np.full(100, 20.0)])
+    bends = BendSpeeds(0.0, np.repeat([20.0, 4.0, 20.0], [60, 20, 100]))
     (straight,) = pace.seconds_to(ROUTE, 0.0, [150.0])
     (bent,) = pace.seconds_to(ROUTE, 0.0, [150.0], bends=bends)
 
