@@ -97,7 +97,7 @@ class MapMatcher:
         """
         xy = np.asarray(xy_m, dtype=np.float64)
         if not np.isfinite(xy).all():
-            return self._match(self._road_xy)
+            return self._match(None, None)
         yaw = yaw_rad if yaw_valid and math.isfinite(yaw_rad) else None
         if speed_mps < -0.3 and yaw is not None:
             yaw += math.pi
@@ -108,13 +108,7 @@ class MapMatcher:
             self._step(xy, yaw, moved)
         if self._away_m == 0.0:
             self._road_xy = xy
-        # Away from every road the car's place on its last one is where it left it: a wild
-        # position must not carry it to the road's end and past a junction.
-        match = self._match(self._road_xy)
-        if match is None or yaw is None or not self._direction_known:
-            return match
-        road_rad = project(match.directed_edge, xy).heading_rad
-        return match._replace(heading_off_rad=float(wrap_angle(yaw - road_rad)))
+        return self._match(xy, yaw)
 
     def _begin(self, xy: Array, yaw: float | None) -> None:
         candidates = self._index.near(xy, BEGIN_RADIUS_M)
@@ -147,21 +141,28 @@ class MapMatcher:
             )
         self._note_legality(moved_m)
 
-    def _match(self, xy: Array | None) -> Match | None:
-        if not self._hypotheses or xy is None:
+    def _match(self, xy: Array | None, yaw: float | None) -> Match | None:
+        # Away from every road the car's place on its last one is where it left it: a wild
+        # position must not carry it to the road's end and past a junction.
+        road_xy = self._road_xy
+        if not self._hypotheses or road_xy is None:
             return None
         best = self._hypotheses[0]
-        near = project(best.near.directed_edge, xy)
+        near = project(best.near.directed_edge, road_xy)
         rivals = tuple(
-            project(other.near.directed_edge, xy)
+            project(other.near.directed_edge, road_xy)
             for other in self._hypotheses[1:]
             if other.cost <= _SURE and not _adjacent(best.near, other.near)
         )
         confident = (
             self._direction_known and self._away_m == 0.0 and near.distance_m < 15.0 and not rivals
         )
+        off_rad = 0.0
+        if xy is not None and yaw is not None and self._direction_known:
+            here = near if xy is road_xy else project(near.directed_edge, xy)
+            off_rad = float(wrap_angle(yaw - here.heading_rad))
         place = near.directed_edge, near.s_m, near.lateral_m, near.distance_m
-        return Match(*place, confident, self._direction_known, rivals=rivals)
+        return Match(*place, confident, self._direction_known, off_rad, rivals)
 
     def _note_legality(self, moved_m: float) -> None:
         edge = self._hypotheses[0].near.directed_edge
