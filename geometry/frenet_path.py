@@ -99,9 +99,15 @@ class FrenetPath:
     # Of many paths nobody asks where they lead: what a table holds of the nodes is made when asked.
 
     @functools.cached_property
+    def _xy(self) -> Array:
+        """(2, M) x and y."""
+        return np.stack([prolonged(self.arc_m, self._arc, column) for column in self._points.T])
+
+    @functools.cached_property
     def _pieces(self) -> Array:
         """(8, M) x, y and the unit vector to the left, and the steps of these to the next node."""
-        return node_table(*(prolonged(self.arc_m, self._arc, column) for column in self._points.T))
+        x_m, y_m = self._xy
+        return node_table(x_m, y_m, self._heading)
 
     @functools.cached_property
     def _nodes(self) -> Array:
@@ -111,7 +117,7 @@ class FrenetPath:
     @functools.cached_property
     def _heading(self) -> Array:
         """(M,) headings without jumps."""
-        return headings(*self._nodes[:2])
+        return headings(*self._xy)
 
     @functools.cached_property
     def _segments(self) -> Array:
@@ -165,7 +171,7 @@ class FrenetPath:
         xy_m, speed_limit_mps, before_m = self._given
         path = FrenetPath(xy_m, speed_limit_mps, before_m=before_m)
         path._is_eased = True
-        path.__dict__["_pieces"] = node_table(*map(cut_corners, self._nodes[:2]))
+        path.__dict__["_xy"] = np.stack([*map(cut_corners, self._xy)])
         return path
 
     def bounded_squares(
@@ -236,7 +242,11 @@ class FrenetPath:
 
     def pose_at(self, arc_m: Array, offset_m: Array | float = 0.0) -> PathPose:
         """Return positions and headings at arc lengths (…) and offsets to the left."""
-        return PathPose(self.point_at(arc_m, offset_m), self.at_nodes(self._heading, arc_m))
+        return PathPose(self.point_at(arc_m, offset_m), self.yaw_at(arc_m))
+
+    def yaw_at(self, arc_m: Array) -> Array:
+        """Return headings (…) at arc lengths (…), without jumps."""
+        return self.at_nodes(self._heading, arc_m)
 
     def _nearest(self, xy_m: Array, end: int) -> npt.NDArray[np.intp]:
         """Return which of the nodes before `end` is nearest to each of the points."""

@@ -33,12 +33,11 @@ def headings(x_m: Array, y_m: Array) -> Array:
     return np.unwrap(np.arctan2(np.gradient(y_m), np.gradient(x_m)))
 
 
-def node_table(x_m: Array, y_m: Array) -> Array:
-    """Return (8, M) nodes and the unit vectors to their left, and the steps of these.
+def node_table(x_m: Array, y_m: Array, heading: Array) -> Array:
+    """Return (8, M) nodes and the unit vectors to their left, by headings, and the steps of these.
 
     A table has a row for each quantity: a look-up gives columns that lie in order.
     """
-    heading = headings(x_m, y_m)
     return with_steps(np.stack([x_m, y_m, -np.sin(heading), np.cos(heading)]))
 
 

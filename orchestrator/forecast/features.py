@@ -97,9 +97,8 @@ def lead_on(path: FrenetPath, arc_m: float, users: tuple[SeenRoadUser, ...]) -> 
         return math.nan, math.nan
     xy = np.array([(user.x_m, user.y_m) for user in users])
     place = path.locate(xy)
-    pose = path.pose_at(place.arc_m)
-    yaw = np.array([user.yaw_rad for user in users])
-    speed = np.array([user.speed_mps for user in users]) * np.cos(yaw - pose.yaw_rad)
+    off_rad = np.array([user.yaw_rad for user in users]) - path.yaw_at(place.arc_m)
+    speed = np.array([user.speed_mps for user in users]) * np.cos(off_rad)
     gap = place.arc_m - arc_m
     on_path = (np.abs(place.offset_m) < LEAD_ASIDE_M) & (gap > 2.0)
     if not on_path.any():

@@ -52,7 +52,7 @@ def observe(seen: Sighting, *, nearest: int) -> Observation:
 
 def _ego(view: PlannerView) -> Array:
     states = view.states
-    heading = wrap_angle(states[:, 2] - view.path.pose_at(view.arc_m).yaw_rad)
+    heading = wrap_angle(states[:, 2] - view.path.yaw_at(view.arc_m))
     return np.column_stack(
         [
             states[:, 3] / SPEED_MPS,

@@ -175,7 +175,7 @@ def _forced(
     place = conflict.way.locate(
         np.stack([x[rows, instant].ravel(), y[rows, instant].ravel()], axis=-1)
     )
-    direction = conflict.way.pose_at(place.arc_m).yaw_rad
+    direction = conflict.way.yaw_at(place.arc_m)
     along = np.cos(yaw[rows, instant].ravel() - direction)
     on_way = (np.abs(place.offset_m) < _ON_WAY_M) & (along > ALONG_COS)
     half_length = view.user_half_m[0][rows, 0].ravel()
@@ -210,7 +210,7 @@ def _arrival(
     x, y, _, speeds = view.users
     half = view.user_half_m[0][future, 0, user]
     start = conflict.way.point_at(np.array([conflict.way_from_m]))[0]
-    yaw = float(conflict.way.pose_at(np.array([conflict.way_from_m])).yaw_rad[0])
+    yaw = float(conflict.way.yaw_at(np.array([conflict.way_from_m]))[0])
     dx, dy = x[future, :, user] - start[0], y[future, :, user] - start[1]
     along = np.cos(yaw) * dx + np.sin(yaw) * dy + half[:, None]
     aside = np.abs(np.cos(yaw) * dy - np.sin(yaw) * dx)

@@ -47,7 +47,7 @@ def choose(
     across the path; `changing` is how others change their motion.
     """
     states = view.states
-    slant = states[:, 2] - view.path.pose_at(view.arc_m).yaw_rad
+    slant = states[:, 2] - view.path.yaw_at(view.arc_m)
     speed = np.maximum(states[:, 3] * np.cos(slant), 0.0)
     accel: Floats = states[:, 7]
     offset: Floats = view.offset_m

@@ -97,7 +97,7 @@ class PathTable:
     def along(self, path: FrenetPath) -> PathProjection:
         """Project every node on another path, so that road users can be found on it at once."""
         place = path.locate(self._poses[:, :2])
-        heading = path.pose_at(place.arc_m).yaw_rad
+        heading = path.yaw_at(place.arc_m)
         columns = [place.arc_m, place.offset_m, self._poses[:, 2] - heading]
         return PathProjection(np.column_stack(columns))
 

@@ -54,7 +54,7 @@ class JunctionRules:
         if not len(self._probes):
             return ()
         place = path.locate(self._probes[..., :2].reshape(-1, 2))
-        heading = path.pose_at(place.arc_m).yaw_rad
+        heading = path.yaw_at(place.arc_m)
         turned = wrap_angle(self._probes[..., 2].ravel() - heading)
         fits = (np.abs(place.offset_m) < _ON_PATH_M) & (np.abs(turned) < _ON_PATH_RAD)
         arcs = place.arc_m.reshape(-1, 3)

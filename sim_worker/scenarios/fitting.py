@@ -104,7 +104,7 @@ def _beside_each_other(case: StagedCase, actor: StagedActor, *, both_straight: b
     ego, way = case.place.ego, case.place.way_named(actor.way)
     met_m = np.array([case.ego_arc_m + case.ego_speed_mps * case.impact_time_s])
     actor_m = actor.moving(way.path).arc_after(actor.start_on(way), np.array([case.impact_time_s]))
-    yaw = ego.path.pose_at(met_m).yaw_rad, way.path.pose_at(actor_m).yaw_rad
+    yaw = ego.path.yaw_at(met_m), way.path.yaw_at(actor_m)
     turned = abs(float(wrap_angle(yaw[0] - yaw[1])[0]))
     if turned < _CROSS_RAD or (both_straight and math.sin(turned) < math.sin(_SQUARE_RAD)):
         return f"{actor.name} would meet the ego along its way, not across it"

@@ -166,9 +166,11 @@ def _match(
     entry, exit_ = float(place.arc_m[0]), float(place.arc_m[-1])
     if exit_ <= max(entry, ego_arc_m + 1.0) or exit_ > path.length_m + 1.0:
         return None
-    turned = np.abs(wrap_angle(headings_rad(line) - path.pose_at(place.arc_m).yaw_rad))
     off = float(np.abs(place.offset_m).mean())
-    if off > _ON_CONNECTION_M or float(turned.mean()) > _HEADS_ALIKE_RAD:
+    if off > _ON_CONNECTION_M:
+        return None
+    turned = np.abs(wrap_angle(headings_rad(line) - path.yaw_at(place.arc_m)))
+    if float(turned.mean()) > _HEADS_ALIKE_RAD:
         return None
     score = off + 5.0 * float(turned.mean()) + 2.0 * float(turned[-1])
     return score, entry, passage

@@ -159,7 +159,7 @@ def ways_over(
     """
     middle = line.mean(axis=0)
     arc = float(ego_way.path.locate(middle[None]).arc_m[0])
-    heading = float(ego_way.path.pose_at(np.array([arc])).yaw_rad[0])
+    heading = float(ego_way.path.yaw_at(np.array([arc]))[0])
     step = line[1] - line[0]
     across_m = float(np.hypot(*step))
     direction = step / across_m

@@ -18,7 +18,8 @@ from foretwin.geometry.path_nodes import (
 
 
 def test_between_two_nodes_all_that_the_table_holds_goes_on_evenly() -> None:
-    table = node_table(np.array([0.0, 3.0, 6.0]), np.array([0.0, 4.0, 8.0]))
+    x_m, y_m = np.array([0.0, 3.0, 6.0]), np.array([0.0, 4.0, 8.0])
+    table = node_table(x_m, y_m, headings(x_m, y_m))
     found = between(table, NodePlace(np.array([0, 1]), np.array([0.5, 0.25])))
     assert found[:2] == pytest.approx(np.array([[1.5, 3.75], [2.0, 5.0]]))
     to_the_left = np.array([[-0.8, -0.8], [0.6, 0.6]])

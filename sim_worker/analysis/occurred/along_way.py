@@ -124,7 +124,7 @@ def _cuts(way: DrivenWay, roads: Roads, course: OtherCourse, on: OnWay) -> Itera
     lead: a change of the car's lane is none of theirs."""
     ego, limit = _ego_mps(way, course), _limit_m(way, course)
     lead = roads.heading_at(course.xy_m, np.asarray(wrap_angle(course.yaw_rad)))
-    along = way.path.pose_at(on.arc_m.copy()).yaw_rad
+    along = way.path.yaw_at(on.arc_m.copy())
     lead = np.where(np.isnan(lead), along, lead)
     slant = np.asarray(wrap_angle(course.yaw_rad - lead))
     sideways = uniform_filter1d(course.speed_mps * np.sin(slant), 15, mode="nearest")

@@ -63,7 +63,7 @@ class DrivenWay:
 
     def heading_at(self, arc_m: float) -> float:
         """Return where the way leads."""
-        return float(self.path.pose_at(np.array([arc_m])).yaw_rad[0])
+        return float(self.path.yaw_at(np.array([arc_m]))[0])
 
     def see(self, course: OtherCourse) -> OnWay:
         """Return where a course is; far away where the car's place is not known."""
@@ -72,7 +72,7 @@ class DrivenWay:
         near = np.nan_to_num(here, nan=0.0) + middle
         found = self.path.locate(course.xy_m, near_arc_m=near, within_m=(_AHEAD_M + _BACK_M) / 2.0)
         at = found.arc_m
-        turned = np.asarray(wrap_angle(course.yaw_rad - self.path.pose_at(at.copy()).yaw_rad))
+        turned = np.asarray(wrap_angle(course.yaw_rad - self.path.yaw_at(at.copy())))
         reach = self.half_m[0] + course.size_m[0] / 2.0
         along = at - here
         gap = np.sign(along) * np.maximum(np.abs(along) - reach, 0.0)

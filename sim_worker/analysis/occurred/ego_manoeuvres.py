@@ -73,7 +73,7 @@ def _passages(way: DrivenWay, roads: Roads) -> Iterator[EgoStretch]:
 def _change(way: DrivenWay, from_arc_m: float, to_arc_m: float) -> float:
     """Return by how much the heading changes, turns counted as driven."""
     at = np.arange(max(from_arc_m, 0.0), min(to_arc_m, way.length_m) + 1.0, 1.0)
-    heading = np.unwrap(way.path.pose_at(at).yaw_rad)
+    heading = np.unwrap(way.path.yaw_at(at))
     return float(heading[-1] - heading[0]) if len(heading) else 0.0
 
 
@@ -82,7 +82,7 @@ def _bends(way: DrivenWay, passed: list[EgoStretch]) -> Iterator[EgoStretch]:
     at = np.arange(0.0, way.length_m, 1.0)
     if len(at) < _LEAST_BEND_M:
         return
-    heading = np.unwrap(way.path.pose_at(at).yaw_rad)
+    heading = np.unwrap(way.path.yaw_at(at))
     ahead = np.minimum(np.arange(len(at)) + round(_BEND_M), len(at) - 1)
     turns = np.abs(heading[ahead] - heading) >= np.radians(45.0)
     for rows in runs_of(turns):

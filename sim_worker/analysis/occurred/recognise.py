@@ -127,7 +127,7 @@ def _met_row(
     in_way = np.abs(on.left_m[own:until]) < way.half_m[1] + course.size_m[1] / 2.0
     ahead = gaps[in_way & (gaps > 0.0) & (gaps < 1e3)]
     measured = measures_of(way, met, vehicle)
-    lead = way.path.pose_at(on.arc_m[own : own + 1].copy()).yaw_rad[0]
+    lead = way.path.yaw_at(on.arc_m[own : own + 1].copy())[0]
     along = float(course.velocity_mps[own] @ [np.cos(lead), np.sin(lead)])
     speed = float(way.ego.speed_mps[first])
     tags = (*OPENLABEL[met.kind], *_user_tag(course.kind))

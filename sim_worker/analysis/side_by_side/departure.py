@@ -109,12 +109,14 @@ def _between_ways(planned: Array, driven: Array) -> tuple[float, float] | tuple[
     if len(moved) < 2 or len(_moved(planned)) < 2:
         return None, None
     way = FrenetPath(moved[:, :2], before_m=0.0)
-    place = way.locate(planned[:, :2])
     gone_m = arc_lengths(planned[:, :2])
-    common = (place.arc_m < way.length_m) & (gone_m <= way.length_m)
-    if not common.any() or min(way.length_m, float(gone_m[-1])) < _LEAST_WAY_M:
+    if min(way.length_m, float(gone_m[-1])) < _LEAST_WAY_M:
         return None, None
-    turned = wrap_angle(planned[common, 2] - way.pose_at(place.arc_m[common]).yaw_rad)
+    place = way.locate(planned[:, :2])
+    common = (place.arc_m < way.length_m) & (gone_m <= way.length_m)
+    if not common.any():
+        return None, None
+    turned = wrap_angle(planned[common, 2] - way.yaw_at(place.arc_m[common]))
     return _greatest(place.offset_m[common]), _greatest(np.asarray(turned))
 
 
