@@ -89,8 +89,7 @@ class DrivingPace:
         bends: BendSpeeds = STRAIGHT,
     ) -> list[float]:
         """Return the expected seconds from a position of the route to later ones, in order."""
-        limits = np.array([directed.speed_limit_mps.value for directed in route.edges])
-        usual = np.maximum(self.share * limits, _LEAST_SPEED_MPS)
+        usual = np.maximum(self.share * route.speed_limit_mps, _LEAST_SPEED_MPS)
         places = np.array(places_m, dtype=np.float64)
         found = np.empty(len(places))
         going = from_m, self.speed_mps, acceleration_mps2

@@ -136,7 +136,11 @@ class _LaneOffsets:
     """How far left of the road's line the driven lane lies along a stretch of route."""
 
     def __init__(self, route: Route, first: int, last: int) -> None:
-        self._offset = np.array([_lane_offset(route, n) for n in range(first, last + 1)])
+        known = route.known_offset_m
+        for number in range(first, last + 1):
+            if number not in known:
+                known[number] = _lane_offset(route, number)
+        self._offset = np.array([known[number] for number in range(first, last + 1)])
         self._start_m = route.start_m[first : last + 1]
 
     def at(self, s: Array) -> Array:
@@ -197,6 +201,5 @@ def _resampled(route: Route, xy: Array, place: Array, begin: float, end: float) 
     even = np.linspace(low, high, max(2, round((high - low) / SPACING_M) + 1))
     points = interpolated(even, arc, xy)
     s = np.interp(even, arc, place)
-    limits = np.array([directed.speed_limit_mps.value for directed in route.edges])
     edge = np.clip(np.searchsorted(route.start_m, s, side="right") - 1, 0, len(route.edges) - 1)
-    return PathGeometry(points, limits[edge], s)
+    return PathGeometry(points, route.speed_limit_mps[edge], s)

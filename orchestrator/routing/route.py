@@ -45,6 +45,17 @@ class Route:
         lengths = [directed.edge.length_m for directed in self.edges]
         return self.origin_m + np.concatenate([[0.0], np.cumsum(lengths)])
 
+    @cached_property
+    def speed_limit_mps(self) -> Array:
+        """The limit (N,) of each edge."""
+        return np.array([directed.speed_limit_mps.value for directed in self.edges])
+
+    @cached_property
+    def known_offset_m(self) -> dict[int, float]:
+        """How far left of the road's line its driven lane lies, by the edge's number, of those
+        along which a path has led: `driving_path` fills it, each round asks for most of them."""
+        return {}
+
     @property
     def end_m(self) -> float:
         """Position s of the route's end."""
