@@ -18,6 +18,7 @@ from foretwin.contracts.keys import TELEMETRY_CHANNELS
 from foretwin.contracts.trace import item_name, span
 from foretwin.orchestrator.drive.conductor import Conductor
 from foretwin.orchestrator.drive.live_loop import is_telemetry
+from foretwin.telemetry.estimator.reordering import rank_in_instant
 
 ADVANCE_TIMEOUT_S = 120.0
 STUCK_AFTER_S = 120.0
@@ -151,8 +152,9 @@ class LockStepLoop:
                     conductor.handle(item)
 
     def _in_order(self) -> list[Received]:
-        """Return the samples laid aside by stamp, then channel, then number."""
-        order = {name: place for place, name in enumerate(TELEMETRY_CHANNELS)}
+        """Return the samples laid aside by stamp, then as an instant's are taken, then number."""
+        channels = sorted(TELEMETRY_CHANNELS, key=rank_in_instant)
+        order = {name: place for place, name in enumerate(channels)}
         keyed = []
         for sample in self._samples:
             place = order[sample.channel]

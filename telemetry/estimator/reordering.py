@@ -15,7 +15,16 @@ _CHECKPOINT_NS, _CALM_CHECKPOINT_NS = 20_000_000, 100_000_000
 more than to take three samples again."""
 _CALM_NS = 5_000_000_000
 _MOST_WAITING = 2048
-_ORDER = ("imu", "heading", "speed", "steering", "gnss")
+_ORDER = ("speed", "imu", "heading", "steering", "gnss")
+
+
+def rank_in_instant(channel: str) -> int:
+    """Return where of an instant's samples those of a channel are taken.
+
+    Speed first, by which a yaw rate tells a bend; the position last of what says how the car moves,
+    for a state leaves with it.
+    """
+    return _ORDER.index(channel) if channel in _ORDER else len(_ORDER)
 
 
 class Sample(NamedTuple):
@@ -92,8 +101,7 @@ class Reordering:
             self._keep(stamp_ns - WINDOW_NS - 1)
         self._seen.add((channel, stamp_ns))
         self._number += 1
-        rank = _ORDER.index(channel) if channel in _ORDER else len(_ORDER)
-        sample = Sample(stamp_ns, rank, self._number, channel, message)
+        sample = Sample(stamp_ns, rank_in_instant(channel), self._number, channel, message)
         place = len(self._samples)
         if place and sample < self._samples[-1]:
             place = bisect.bisect(self._samples, sample)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections import Counter
 from collections.abc import Callable, Iterator
@@ -81,12 +82,12 @@ class Log:
     """Samples refused by reason, as far as the latest `samples()` has come."""
 
     def samples(self) -> Iterator[Sample]:
-        """Yield every valid telemetry sample in stamp order, the positions of an instant last.
+        """Yield every valid sample in stamp order, of an instant speed first and positions last.
 
         The rest is counted in `skipped`.
         """
         self.skipped.clear()
-        yield from _positions_last(screened(self.read(self.skipped), self.skipped))
+        yield from _instants_in_order(screened(self.read(self.skipped), self.skipped))
 
 
 def screened(samples: Iterator[Sample], skipped: Counter[str]) -> Iterator[Sample]:
@@ -121,22 +122,23 @@ def screened(samples: Iterator[Sample], skipped: Counter[str]) -> Iterator[Sampl
         yield channel, message
 
 
-def _positions_last(samples: Iterator[Sample]) -> Iterator[Sample]:
-    """Let positions follow all else of their instant, as the estimator has them of a live car.
+def _instants_in_order(samples: Iterator[Sample]) -> Iterator[Sample]:
+    """Let the samples of an instant follow one another as the estimator has them of a live car.
 
-    A state leaves with each position: what stands beside one in a row of a table counts in it.
+    A state leaves with each position: what stands beside one in a row of a table counts in it. And
+    speed tells what bend a yaw rate beside it is.
     """
-    fixes: list[Sample] = []
-    for sample in samples:
-        message = sample[1]
-        if fixes and message.stamp_ns != fixes[0][1].stamp_ns:  # type: ignore[attr-defined]
-            yield from fixes
-            fixes = []
-        if isinstance(message, drive.GnssFix):
-            fixes.append(sample)
-        else:
-            yield sample
-    yield from fixes
+    for _, instant in itertools.groupby(samples, key=lambda sample: sample[1].stamp_ns):  # type: ignore[attr-defined]
+        yield from sorted(instant, key=_rank)
+
+
+def _rank(sample: Sample) -> int:
+    match sample[1]:
+        case drive.SpeedSample():
+            return 0
+        case drive.GnssFix():
+            return 2
+    return 1
 
 
 def fault_of(message: msgspec.Struct) -> str | None:

@@ -25,8 +25,8 @@ from foretwin.telemetry.standin.parameters import CarParameters, SensorParameter
 from foretwin.telemetry.standin.path import DrivenPath
 
 PERIOD_MS = {
-    "imu": 10,
     "speed": 20,
+    "imu": 10,
     "steering": 20,
     "control": 20,
     "status": 100,

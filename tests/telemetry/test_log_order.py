@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 
 from foretwin.contracts.drive import (
     GnssFix,
+    ImuSample,
     RoadUser,
     RoadUsers,
     SignalState,
@@ -34,8 +35,15 @@ def fix(stamp_ns: int, lat_deg: float = 52.5) -> Sample:
     return "gnss", GnssFix(stamp_ns=stamp_ns, position=GeoPoint(lat_deg, 13.4))
 
 
+def turning(stamp_ns: int) -> Sample:
+    return "imu", ImuSample(
+        stamp_ns=stamp_ns, accel_mps2=(0.0, 0.0, 9.8), rate_radps=(0.0, 0.0, 0.1)
+    )
+
+
 dirty = st.lists(
-    st.builds(speed, st.integers(-2, 30))
+    st.builds(turning, st.integers(-2, 30))
+    | st.builds(speed, st.integers(-2, 30))
     | st.builds(fix, st.integers(-2, 30), st.sampled_from([52.5, float("nan"), 91.0])),
     max_size=30,
 )
@@ -52,11 +60,12 @@ def test_order_is_kept_and_every_loss_counted(samples: list[Sample]) -> None:
 
 
 @given(dirty)
-def test_positions_follow_what_else_is_of_their_instant(samples: list[Sample]) -> None:
+def test_of_an_instant_speed_comes_first_and_positions_last(samples: list[Sample]) -> None:
     info = VehicleInfo(vehicle_id="car", time_base="log", start_stamp_ns=0)
     given_out = list(Log(info=info, read=lambda skipped: iter(samples)).samples())
     kept = list(screened(iter(samples), Counter()))
-    assert given_out == sorted(kept, key=lambda one: (stamp_ns_of(one), one[0] == "gnss"))
+    ranks = {"speed": 0, "imu": 1, "gnss": 2}
+    assert given_out == sorted(kept, key=lambda one: (stamp_ns_of(one), ranks[one[0]]))
 
 
 @given(st.lists(st.integers(0, 1000), max_size=40), st.lists(st.integers(0, 1000), max_size=40))

@@ -17,6 +17,7 @@ from foretwin.contracts.simulation import PlaneState
 from foretwin.contracts.tuning import SetRequest
 from foretwin.orchestrator.drive import lock_step
 from foretwin.orchestrator.drive.lock_step import LockStepError, LockStepLoop
+from foretwin.telemetry.estimator.estimator import StateEstimator
 from tests.contracts.mirror_samples import mirror_sample
 from tests.orchestrator.house import AtOnce, House
 from tests.orchestrator.trip import START_NS
@@ -27,7 +28,9 @@ NOWHERE = PlaneState(0.0, 0.0, 0.0, 0.0)
 class Car:
     """The vehicle's process: publishes up to a stamp when asked, channel by channel."""
 
-    def __init__(self, house: House, *, until_s: float, channels: tuple[str, ...]) -> None:
+    def __init__(
+        self, house: House, *, until_s: float, channels: tuple[str, ...], speed_after_ns: int = 1
+    ) -> None:
         self._bus = house.bus
         self._channels = channels
         end_ns = START_NS + round(until_s * 1e9)
@@ -36,7 +39,10 @@ class Car:
             if state.stamp_ns <= end_ns:
                 self._waiting += [
                     ("gnss", GnssFix(stamp_ns=state.stamp_ns, position=state.position)),
-                    ("speed", SpeedSample(stamp_ns=state.stamp_ns + 1, speed_mps=10.0)),
+                    (
+                        "speed",
+                        SpeedSample(stamp_ns=state.stamp_ns + speed_after_ns, speed_mps=10.0),
+                    ),
                 ]
         self.published: dict[str, int] = {}
         house.bus.serve("advance", AtOnce(self._advance), vehicle="ego")  # type: ignore[arg-type]
@@ -145,6 +151,25 @@ def test_results_do_not_depend_on_who_arrives_first_nor_on_the_number_of_workers
         states.add(msgspec.json.encode(latest.state))
 
     assert (len(hashes), len(states)) == (1, 1)
+
+
+def test_of_an_instant_the_position_is_taken_last_as_without_lock_step(
+    houses: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    taken, handle = [], StateEstimator.handle
+
+    def watched(estimator: StateEstimator, channel: str, message: Any, **options: Any) -> Any:
+        taken.append((message.stamp_ns, channel))
+        return handle(estimator, channel, message, **options)
+
+    monkeypatch.setattr(StateEstimator, "handle", watched)
+    house = houses()
+    add_mirror(house)
+    Car(house, until_s=3.0, channels=("gnss", "speed"), speed_after_ns=0)
+    assert loop(house).run()
+
+    stamps = sorted({stamp_ns for stamp_ns, _ in taken})
+    assert taken == [(stamp_ns, channel) for stamp_ns in stamps for channel in ("speed", "gnss")]
 
 
 def test_a_change_asked_for_during_a_round_counts_before_the_next_one(houses: Any) -> None:

@@ -16,6 +16,7 @@ from foretwin.telemetry.estimator.estimator import StateEstimator
 from foretwin.telemetry.estimator.motion_track import MotionTrack
 from foretwin.telemetry.estimator.reordering import WINDOW_NS, Reordering
 from tests.telemetry.position_track import Sample, circle, fix, info
+from tests.telemetry.winding_drive import measured, truly
 
 
 @functools.cache
@@ -100,6 +101,15 @@ def test_for_some_seconds_after_a_late_sample_it_is_copied_oftener() -> None:
 def test_later_on_it_is_copied_as_before() -> None:
     few, calm = copies_in(9.0, late_at=20), copies_in(9.0)
     assert few - calm == pytest.approx(5.0 / 0.05 - 5.0 / 0.1, abs=5)
+
+
+def test_of_an_instant_the_speed_is_taken_first_by_which_a_yaw_rate_tells_a_bend() -> None:
+    reordering, taken = Reordering(MotionTrack(info())), []
+    for channel, message in reversed(list(measured(0, gyro=truly, wheels=truly, heading=truly))):
+        reordering.add(channel, message)
+    with mock.patch.object(MotionTrack, "take", lambda _, channel, message: taken.append(channel)):
+        reordering.track()
+    assert taken == ["speed", "imu", "heading"]
 
 
 def test_a_flood_between_two_states_stays_bounded() -> None:
