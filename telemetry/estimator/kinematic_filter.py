@@ -39,8 +39,6 @@ _MAX_STEP_S = 0.05
 _HARDEST_MPS2 = 10.0
 """No car on tyres turns harder (1 g)."""
 _STANDING_CURVATURE_PM = 0.1
-_STRAIGHT_DEVIATIONS = 3.0
-"""A gyro that reads less of its noise tells of no turn."""
 
 
 class KinematicFilter:
@@ -247,29 +245,7 @@ class KinematicFilter:
         row[YAW] = 1.0
         return self.correct(row, math.remainder(yaw_rad - self.mean.item(YAW), math.tau), std_rad)
 
-    def correct_yaw_rate(
-        self, rate_radps: float, std_radps: float, *, biased: bool
-    ) -> LineInnovation:
-        """Apply a measured yaw rate; return how far it lay off.
-
-        `biased` for a gyro, whose bias is estimated.
-        """
-        row = np.zeros(len(self.mean))
-        speed, curvature = self.mean.item(SPEED), self.mean.item(CURVATURE)
-        row[SPEED], row[CURVATURE] = curvature, speed
-        expected = speed * curvature
-        if biased:
-            self._know_slip()
-            row[GYRO_BIAS], bias = 1.0, self.mean.item(GYRO_BIAS)
-            expected += bias
-            if abs(rate_radps - bias) < _STRAIGHT_DEVIATIONS * std_radps:
-                # Who pulls away straight on after a bend does not stand.
-                by_speed, by_curvature = (self.covariance.item(i, i) for i in (SPEED, CURVATURE))
-                if by_speed * curvature**2 > by_curvature * speed**2:
-                    row[SPEED] = 0.0
-        return self.correct(row, rate_radps - expected, std_radps)
-
-    def _know_slip(self) -> None:
+    def know_slip(self) -> None:
         """Tell the body's heading from the path's: a gyro shows how they part."""
         self._slip_density = motion_noise.GYRO_SLIP_DENSITY
         if self.covariance.item(SLIP, SLIP) == 0.0:

@@ -15,6 +15,7 @@ from foretwin.telemetry.estimator.measured import Doubt, MotionSamples
 from foretwin.telemetry.estimator.mounting import MountingLearner
 from foretwin.telemetry.estimator.sensor_trust import LEFT_OUT, SensorTrust
 from foretwin.telemetry.estimator.shallow_copy import shallow_copy
+from foretwin.telemetry.estimator.yaw_rates import correct_gyro, correct_yaw_rate
 
 STANDING_MPS = 0.05
 """Below this measured speed a car stands."""
@@ -158,7 +159,7 @@ class MotionCorrections:
                 self._surprises.take_line("heading", off, least_std=_LEAST_YAW_STD_RAD)
                 if yaw_rate is not None:
                     std = self._yaw_rate_doubt.std(abs(yaw_rate - filter_.yaw_rate_radps))
-                    filter_.correct_yaw_rate(yaw_rate, std, biased=False)
+                    correct_yaw_rate(filter_, yaw_rate, std)
             case SteeringSample():
                 curvature_pm = self._measured.curvature_pm(self._wheelbase_m)
                 if curvature_pm is not None:
@@ -169,7 +170,7 @@ class MotionCorrections:
         off = abs(rate_radps - filter_.yaw_rate_radps - filter_.mean.item(GYRO_BIAS))
         doubt = self._gyro_doubt.std(off / _USUAL_SURPRISE)
         known = self._gyro.std_radps
-        innovation = filter_.correct_yaw_rate(rate_radps, max(known, doubt), biased=True)
+        innovation = correct_gyro(filter_, rate_radps, max(known, doubt))
         self._surprises.take_line("imu", innovation, least_std=known, usual=_USUAL_SURPRISE)
         self.gyro_bias_radps = filter_.mean.item(GYRO_BIAS)
 

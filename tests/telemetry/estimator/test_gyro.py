@@ -10,10 +10,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from foretwin.contracts.drive import ImuSample, SpeedSample
-from foretwin.telemetry.estimator.filter_state import CURVATURE, SPEED, YAW, X
+from foretwin.telemetry.estimator.filter_state import YAW, X
 from foretwin.telemetry.estimator.gyro import Gyro
 from foretwin.telemetry.estimator.kinematic_filter import KinematicFilter
 from foretwin.telemetry.estimator.motion_track import MotionTrack
+from foretwin.telemetry.estimator.yaw_rates import correct_gyro
 from tests.telemetry.position_track import fix, info
 
 MS = 1_000_000
@@ -81,31 +82,6 @@ def test_what_was_learnt_before_the_heading_was_known_is_used() -> None:
     assert np.abs(np.array(found) - 0.003).max() < 6e-4
 
 
-def stood_in_a_bend() -> KinematicFilter:
-    filter_ = KinematicFilter(xy_m=np.zeros(2), yaw_rad=0.0, speed_mps=0.0, yaw_std_rad=0.1)
-    filter_.mean[CURVATURE] = 0.14
-    filter_.stand(0.1, 1.0)
-    filter_.mean[CURVATURE] = 0.14
-    return filter_
-
-
-def speed_std_mps(filter_: KinematicFilter, *, rate_radps: float | None) -> float:
-    for _ in range(50):
-        filter_.predict(0.02)
-        if rate_radps is not None:
-            filter_.correct_yaw_rate(rate_radps, 0.003, biased=True)
-    return math.sqrt(filter_.covariance[SPEED, SPEED])
-
-
-def test_who_pulls_away_straight_on_after_a_bend_does_not_stand_by_the_gyro() -> None:
-    """By the bend in which it stopped a rate of nought would mean that it still stands."""
-    alone = speed_std_mps(stood_in_a_bend(), rate_radps=None)
-    assert speed_std_mps(stood_in_a_bend(), rate_radps=0.0) > 0.9 * alone
-    turning = stood_in_a_bend()
-    speed_std_mps(turning, rate_radps=0.3)
-    assert turning.mean[SPEED] > 0.5  # who turns does move
-
-
 @given(st.floats(-3.0, 3.0), st.floats(-3.0, 3.0), st.floats(0.01, 5.0), st.booleans())
 def test_a_held_yaw_stays_as_it_is_and_as_unsure(
     x_m: float, y_m: float, std_m: float, wander: bool
@@ -113,7 +89,7 @@ def test_a_held_yaw_stays_as_it_is_and_as_unsure(
     filter_ = KinematicFilter(xy_m=np.zeros(2), yaw_rad=0.3, speed_mps=8.0, yaw_std_rad=0.1)
     filter_.expect_wander(1.0)
     filter_.predict(2.0)
-    filter_.correct_yaw_rate(0.05, 0.005, biased=True)
+    correct_gyro(filter_, 0.05, 0.005)
     yaw, before = filter_.mean[YAW], filter_.covariance.copy()
     innovation = filter_.position_innovation(
         filter_.mean[:2] + np.array([x_m, y_m]), (1.0, 0.0), wander=wander
