@@ -165,8 +165,10 @@ class PositionNoise:
         std = self.std_m(fix)
         if not self.wanders(fix):
             return std
+        if self.seen_m is None:
+            return std  # nobody knows yet what of it changes
         white = _WHITE_SHARE * (stated_m(fix) or _LEAST_STATED_M)
-        if self.seen_m is not None and self._jerked_m < _CLEAR * white:
+        if self._jerked_m < _CLEAR * white:
             return max(self.seen_m, LEAST_STD_M)
         # This share is nobody's word: where surprises cannot tell, as much as they leave open.
         return max(white, self._seen_beyond(white), min(self._untold_m, std))
@@ -198,9 +200,9 @@ class PositionNoise:
 
     def sure_white_std_m(self, fix: GnssFix) -> float:
         """Return a white noise that is surely no smaller: beyond it fixes contradict a sensor."""
-        if self.seen_m is not None:
-            return self.white_std_m(fix)
-        return UNSEEN_STD_M if stated_m(fix) is None else self.std_m(fix)
+        if self.seen_m is None and stated_m(fix) is None:
+            return UNSEEN_STD_M
+        return self.white_std_m(fix)
 
     def _seen_beyond(self, stated_m: float) -> float:
         """Return what was seen where it gives the lie to `stated_m`, 0 elsewhere."""
