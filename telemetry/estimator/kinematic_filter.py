@@ -39,6 +39,7 @@ _MAX_STEP_S = 0.05
 _HARDEST_MPS2 = 10.0
 """No car on tyres turns harder (1 g)."""
 _STANDING_CURVATURE_PM = 0.1
+_UNKNOWN_PLACE_M = 1000.0
 
 
 class KinematicFilter:
@@ -51,12 +52,18 @@ class KinematicFilter:
     """
 
     def __init__(
-        self, *, xy_m: Array, yaw_rad: float, speed_mps: float, yaw_std_rad: float
+        self,
+        *,
+        xy_m: Array,
+        yaw_rad: float,
+        speed_mps: float,
+        yaw_std_rad: float,
+        speed_std_mps: float = 1.0,
     ) -> None:
         self.mean: Array = np.zeros(SIZE)
         self.mean[: CURVATURE + 1] = xy_m[0], xy_m[1], yaw_rad, speed_mps, 0.0, 0.0
         spread = np.zeros(SIZE)
-        spread[: CURVATURE + 1] = 0.1, 0.1, yaw_std_rad, 1.0, 1.0, 0.05
+        spread[: CURVATURE + 1] = 0.1, 0.1, yaw_std_rad, speed_std_mps, 1.0, 0.05
         spread[GYRO_BIAS] = motion_noise.GYRO_BIAS_STD_RADPS
         spread[ACCEL_BIAS] = motion_noise.ACCEL_BIAS_STD_MPS2
         self.covariance: Array = np.diag(spread * spread)
@@ -139,6 +146,11 @@ class KinematicFilter:
             self.mean = np.append(self.mean, 0.0)
             self.covariance = np.pad(self.covariance, (0, 1))
 
+    def way_m(self, duration_s: float) -> Array:
+        """Return how far (2,) the car goes in `duration_s`, straight on."""
+        course, distance_m = self.mean.item(YAW), self.mean.item(SPEED) * duration_s
+        return distance_m * np.array([math.cos(course), math.sin(course)])
+
     def doubt_position(self, std_m: float) -> None:
         """Make the place unknown within `std_m` and tell it apart from what else is known."""
         self.covariance[:2, :] = 0.0
@@ -195,6 +207,14 @@ class KinematicFilter:
         self.mean = self.mean + gain @ innovation.residual_m
         self.covariance = 0.5 * (covariance + covariance.T)
         self._limit()
+
+    def begin_beside(
+        self, xy_m: Array, lever_m: tuple[float, float], *, std_m: float, white_m: float
+    ) -> None:
+        """Know the place by one position alone, of which all but `white_m` of `std_m` wanders."""
+        self.doubt_position(_UNKNOWN_PLACE_M)
+        self.expect_wander(std_m)
+        self.correct_position(self.position_innovation(xy_m, lever_m, wander=True), white_m)
 
     def move_position(self, xy_m: Array, std_m: float, lever_m: tuple[float, float]) -> None:
         """Put the sensor at `xy_m` and leave yaw and motion as they are: the source jumped."""

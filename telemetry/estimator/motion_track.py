@@ -22,12 +22,14 @@ from foretwin.telemetry.estimator.position_corrections import PositionCorrection
 from foretwin.telemetry.estimator.position_gate import PositionGate, Verdict
 from foretwin.telemetry.estimator.reported_state import (
     StateConsistency,
+    consistency_of,
     moving_state,
     unmoved_state,
 )
 from foretwin.telemetry.estimator.shallow_copy import shallow_copy
 
-_UNKNOWN_PLACE_M = 1000.0
+_COURSE_STD_RAD, _SPEED_STD_MPS = 0.15, 1.0
+"""At the least, of a course between fixes and of a speed: a car turns and pulls away. Chosen."""
 _MOST_FASTER_MPS = 5.0
 """A second and a half of a car's hardest pulling away (0.35 g)."""
 
@@ -152,8 +154,7 @@ class MotionTrack:
             expected = filter_.sensor_xy(self._lever[:2])
             late_ns = self._filter_stamp_ns - fix.stamp_ns
             if late_ns > 0:
-                way_m, course = filter_.mean[SPEED] * late_ns * 1e-9, filter_.mean[YAW]
-                xy = xy + way_m * np.array([math.cos(course), math.sin(course)])
+                xy = xy + filter_.way_m(late_ns * 1e-9)
         verdict = self._gate.judge(time_s, xy, expected)
         if verdict == "skip":
             return False
@@ -169,7 +170,7 @@ class MotionTrack:
         if self._corrections.watch_fix(fix.stamp_ns, xy, sure_m, convergence_rad=turned_rad):
             filter_, self._filter, self._standing = None, None, False  # a sensor led it astray
         if filter_ is None:
-            self._start_from_course(fix.stamp_ns, self._positions.noise.std_m(fix))
+            self._start_from_course(fix)
         else:
             self._correct(filter_, xy, fix, verdict)
             self._give_up_unsound(filter_)
@@ -186,37 +187,46 @@ class MotionTrack:
         if found.course_rad is not None:
             self._start(self._filter_stamp_ns, found.course_rad, yaw_std_rad=0.3)
 
-    def _start_from_course(self, stamp_ns: int, std: float) -> None:
-        course = self._gate.course(max(1.0, 5.0 * std))
-        measured = self._measured.fresh("speed_mps", stamp_ns)
+    def _start_from_course(self, fix: GnssFix) -> None:
+        noise = self._positions.noise
+        least_m = max(1.0, 5.0 * noise.std_m(fix))
+        course = self._gate.course(least_m)
+        measured = self._measured.fresh("speed_mps", fix.stamp_ns)
         speed_mps = self._measured.speed_mps if measured else math.inf
         if course is None or abs(speed_mps) < 0.3:
             return
-        self._start(stamp_ns, course if speed_mps > 0.0 else course + math.pi, yaw_std_rad=0.15)
+        std_rad = max(_COURSE_STD_RAD, math.sqrt(2.0) * noise.apart_std_m(fix) / least_m)
+        yaw_rad = course if speed_mps > 0.0 else course + math.pi
+        self._start(fix.stamp_ns, yaw_rad, yaw_std_rad=std_rad)
 
     def _start(self, stamp_ns: int, yaw_rad: float, *, yaw_std_rad: float) -> None:
         measured = self._measured.fresh("speed_mps", stamp_ns)
         if len(self._gate.recent) < (1 if measured else 2):
             return  # a heading alone does not tell how fast the car goes
-        speed_mps = self._measured.speed_mps if measured else self._gate.speed_mps()
-        if self._filter is not None and not measured:
-            # Lost or not: no car has become so much faster since it was known.
-            before_mps = abs(float(self._filter.mean[SPEED]))
-            speed_mps = min(speed_mps, before_mps + _MOST_FASTER_MPS)
+        noise, fix = self._positions.noise, self._fix
+        assert fix is not None  # the gate has it
+        speed_mps, shown_mps = self._measured.speed_mps, 0.0
+        if not measured:
+            speed_mps = self._gate.speed_mps()
+            shown_mps = self._gate.speed_std_mps(noise.apart_std_m(fix))
+            if self._filter is not None:
+                # Lost or not: no car has become so much faster since it was known.
+                speed_mps = min(speed_mps, abs(self._filter.mean.item(SPEED)) + _MOST_FASTER_MPS)
         since_s, at = self._gate.gone_on((stamp_ns - self._start_ns) * 1e-9, yaw_rad, speed_mps)
         xy = base_from_sensor(at, yaw_rad, self._lever)
         self._filter = KinematicFilter(
-            xy_m=xy, yaw_rad=yaw_rad, yaw_std_rad=yaw_std_rad, speed_mps=speed_mps
+            xy_m=xy,
+            yaw_rad=yaw_rad,
+            yaw_std_rad=yaw_std_rad,
+            speed_mps=speed_mps,
+            speed_std_mps=max(_SPEED_STD_MPS, shown_mps),
         )
         self._filter.doubt_motion(min(since_s, 1.0), 0.0, since_s)
         self._corrections.begin(self._filter)
         self._filter_stamp_ns = stamp_ns
-        noise, fix = self._positions.noise, self._fix
-        if fix is not None and noise.wanders(fix):
-            self._filter.doubt_position(_UNKNOWN_PLACE_M)
-            self._filter.expect_wander(noise.std_m(fix))
-            innovation = self._filter.position_innovation(at, self._lever[:2], wander=True)
-            self._filter.correct_position(innovation, noise.white_std_m(fix))
+        if noise.wanders(fix):
+            std_m, white_m = noise.std_m(fix), noise.white_std_m(fix)
+            self._filter.begin_beside(at, self._lever[:2], std_m=std_m, white_m=white_m)
 
     def _give_up_unsound(self, filter_: KinematicFilter) -> None:
         """Begin anew with the next fix or heading where a correction led to no motion of a car."""
@@ -286,15 +296,5 @@ class MotionTrack:
     @property
     def consistency(self) -> StateConsistency:
         """Whether the states were as sure of themselves as they turned out to be."""
-        found, fix = self._positions, self._fix
-        noise = found.noise
-        noise_m = None if fix is None else math.hypot(noise.std_m(fix), noise.hidden_std_m(fix))
-        mounting = self._corrections.mounting.mounting
-        return StateConsistency(
-            self._surprises.counts,
-            found.overconfidence,
-            found.stretched,
-            noise_m,
-            found.slips,
-            mounting,
-        )
+        found, mounting = self._positions, self._corrections.mounting.mounting
+        return consistency_of(found, self._fix, surprises=self._surprises, mounting=mounting)

@@ -212,8 +212,15 @@ class PositionGate:
         """Return the speed between the last two believed fixes, 0 before there are two."""
         if len(self.recent) < 2:
             return 0.0
-        last, before = self.recent[-1], self.recent[-2]
-        return _distance(last.xy_m, before.xy_m) / max(last.time_s - before.time_s, 0.02)
+        return self.last_step_m / self._last_step_s
+
+    def speed_std_mps(self, std_m: float) -> float:
+        """Return how well two fixes of `std_m` tell that speed."""
+        return math.sqrt(2.0) * std_m / self._last_step_s if len(self.recent) > 1 else 0.0
+
+    @property
+    def _last_step_s(self) -> float:
+        return max(self.recent[-1].time_s - self.recent[-2].time_s, 0.02)
 
 
 def _distance(a: Array, b: Array) -> float:

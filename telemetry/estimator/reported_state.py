@@ -5,14 +5,15 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from foretwin.contracts.drive import VehicleState
+from foretwin.contracts.drive import GnssFix, VehicleState
 from foretwin.contracts.frames import GeoPoint, wrap_angle
 from foretwin.telemetry.estimator.filter_state import ACCEL, CURVATURE, SPEED, YAW, X, Y
-from foretwin.telemetry.estimator.innovations import Surprises
+from foretwin.telemetry.estimator.innovations import SurpriseCount, Surprises
 from foretwin.telemetry.estimator.kinematic_filter import KinematicFilter
 from foretwin.telemetry.estimator.map_aid import ALIKE_M
 from foretwin.telemetry.estimator.measured import MotionSamples
 from foretwin.telemetry.estimator.mounting import Mounting
+from foretwin.telemetry.estimator.position_corrections import PositionCorrections
 from foretwin.telemetry.estimator.told_spreads import Stretched
 
 
@@ -31,6 +32,26 @@ class StateConsistency(NamedTuple):
     position_noise_m: float | None
     slips: int
     mounting: Mounting
+
+
+def consistency_of(
+    positions: PositionCorrections,
+    fix: GnssFix | None,
+    *,
+    surprises: SurpriseCount,
+    mounting: Mounting,
+) -> StateConsistency:
+    """Return how good estimates are of which `fix` is the newest position."""
+    noise = positions.noise
+    noise_m = None if fix is None else math.hypot(noise.std_m(fix), noise.hidden_std_m(fix))
+    return StateConsistency(
+        surprises.counts,
+        positions.overconfidence,
+        positions.stretched,
+        noise_m,
+        positions.slips,
+        mounting,
+    )
 
 
 def unmoved_state(

@@ -158,3 +158,11 @@ def test_the_first_rough_fixes_may_differ_by_all_that_they_state() -> None:
     speeds, _ = first_states(3)
 
     assert speeds > 0.8
+
+
+def test_a_motion_begins_as_unsure_as_two_rough_fixes_tell_it() -> None:
+    """Speeds were called known within 1 m/s, courses within 8.6°: 5 and 63 of 100 were within."""
+    speeds, yaws = first_states(1)
+
+    assert speeds > 0.75
+    assert yaws > 0.85
