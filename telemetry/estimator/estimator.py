@@ -14,10 +14,12 @@ import msgspec
 from foretwin.contracts.drive import VehicleInfo, VehicleState
 from foretwin.contracts.keys import CHANNELS
 from foretwin.contracts.vehicle import VehicleParameters
+from foretwin.geometry.steering import column_of
 from foretwin.telemetry.estimator.clock import ClockEstimator
 from foretwin.telemetry.estimator.clock_steps import ClockStep, ClockSteps
 from foretwin.telemetry.estimator.fix_rhythm import FixRhythm
 from foretwin.telemetry.estimator.map_aid import RoadLine
+from foretwin.telemetry.estimator.measured import USUAL_STEERING, Steering
 from foretwin.telemetry.estimator.motion_track import MotionTrack
 from foretwin.telemetry.estimator.reordering import Reordering
 from foretwin.telemetry.estimator.reported_state import StateConsistency
@@ -53,21 +55,8 @@ class StateEstimator:
     twice, by channel.
     """
 
-    def __init__(
-        self,
-        info: VehicleInfo,
-        *,
-        wheelbase_m: float = 2.7,
-        steering_ratio: float = 15.0,
-        steering_offset_rad: float = 0.0,
-    ) -> None:
-        """`steering_ratio` is steering wheel over tyre; the offset is added at the tyre."""
-        self._track = MotionTrack(
-            info,
-            wheelbase_m=wheelbase_m,
-            steering_ratio=steering_ratio,
-            steering_offset_rad=steering_offset_rad,
-        )
+    def __init__(self, info: VehicleInfo, *, steering: Steering = USUAL_STEERING) -> None:
+        self._track = MotionTrack(info, steering=steering)
         self._reordering: Reordering | None = None
         self._clock = ClockEstimator()
         self._steps = ClockSteps(self._clock)
@@ -246,9 +235,5 @@ class StateEstimator:
 
 def estimator_of(info: VehicleInfo, vehicle: VehicleParameters) -> StateEstimator:
     """Return the estimator of the state of a vehicle with these parameters."""
-    return StateEstimator(
-        info,
-        wheelbase_m=vehicle.wheelbase_m.value,
-        steering_ratio=vehicle.steering_ratio.value,
-        steering_offset_rad=vehicle.steering_offset_rad.value,
-    )
+    steering = Steering(vehicle.wheelbase_m.value, column_of(vehicle))
+    return StateEstimator(info, steering=steering)

@@ -6,7 +6,7 @@ import functools
 import math
 import sys
 from collections import Counter
-from typing import Any
+from typing import Any, NamedTuple
 
 import msgspec
 
@@ -40,13 +40,23 @@ _LIMITS = {
 """Beyond these a number is no motion of a road vehicle."""
 
 
+class Steering(NamedTuple):
+    """By what a car's path bends as its steering turns."""
+
+    wheelbase_m: float
+    column: SteeringColumn
+
+
+USUAL_STEERING = Steering(wheelbase_m=2.7, column=SteeringColumn(ratio=15.0, offset_rad=0.0))
+"""An ordinary car's, for one of which nothing else is known."""
+
+
 class MotionSamples:
     """Remembers samples beside positions; `skipped` counts what it refused, by reason."""
 
-    def __init__(
-        self, *, steering_ratio: float, steering_offset_rad: float, skipped: Counter[str]
-    ) -> None:
-        self._column = SteeringColumn(steering_ratio, steering_offset_rad)
+    def __init__(self, steering: Steering = USUAL_STEERING, *, skipped: Counter[str]) -> None:
+        self.wheelbase_m = steering.wheelbase_m
+        self._column = steering.column
         self._skipped = skipped
         self._sample_ns: dict[str, int] = {}
         self._field_ns: dict[str, int] = {}
@@ -137,10 +147,11 @@ class MotionSamples:
         wheel = self._steering.steering_wheel_rad
         return None if wheel is None else self._column.tire_rad(wheel)
 
-    def curvature_pm(self, wheelbase_m: float) -> float | None:
-        """Return the path's curvature that the tyres' angle implies, None without one."""
+    @property
+    def curvature_pm(self) -> float | None:
+        """The path's curvature that the tyres' angle implies, None without one."""
         angle = self.tire_angle_rad
-        return None if angle is None else math.tan(angle) / wheelbase_m
+        return None if angle is None else math.tan(angle) / self.wheelbase_m
 
 
 class Doubt:

@@ -37,11 +37,8 @@ class MotionCorrections:
     """Gives each kind of sample its weight, which it loses as it surprises; a gyro's is known, and
     is lost where its surprises are beyond that."""
 
-    def __init__(
-        self, measured: MotionSamples, surprises: SurpriseCount, *, wheelbase_m: float
-    ) -> None:
+    def __init__(self, measured: MotionSamples, surprises: SurpriseCount) -> None:
         self._measured = measured
-        self._wheelbase_m = wheelbase_m
         self._speed_doubt = Doubt(_LEAST_SPEED_STD_MPS, _MOST_SPEED_STD_MPS)
         self._yaw_doubt = Doubt(_LEAST_YAW_STD_RAD)
         self._yaw_rate_doubt = Doubt(0.01)
@@ -78,7 +75,7 @@ class MotionCorrections:
         """
         stamp_ns, curvature_pm = message.stamp_ns, None
         if isinstance(message, SteeringSample):
-            curvature_pm = self._measured.curvature_pm(self._wheelbase_m)
+            curvature_pm = self._measured.curvature_pm
         bias = self._gyro.bias_radps
         self.trust.take(message, gyro_bias_radps=bias, curvature_pm=curvature_pm)
         believed = channel not in self.trust.left_out
@@ -161,7 +158,7 @@ class MotionCorrections:
                     std = self._yaw_rate_doubt.std(abs(yaw_rate - filter_.yaw_rate_radps))
                     correct_yaw_rate(filter_, yaw_rate, std)
             case SteeringSample():
-                curvature_pm = self._measured.curvature_pm(self._wheelbase_m)
+                curvature_pm = self._measured.curvature_pm
                 if curvature_pm is not None:
                     # Understeer and an unknown offset make steering a rough witness of the path.
                     filter_.correct_curvature(curvature_pm, 0.03)

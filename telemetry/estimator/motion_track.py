@@ -16,7 +16,7 @@ from foretwin.telemetry.estimator.innovations import SurpriseCount
 from foretwin.telemetry.estimator.kinematic_filter import KinematicFilter
 from foretwin.telemetry.estimator.local_place import LocalPlace
 from foretwin.telemetry.estimator.map_aid import MapAid, RoadLine
-from foretwin.telemetry.estimator.measured import MotionSamples
+from foretwin.telemetry.estimator.measured import USUAL_STEERING, MotionSamples, Steering
 from foretwin.telemetry.estimator.motion_corrections import MotionCorrections
 from foretwin.telemetry.estimator.position_corrections import PositionCorrections
 from foretwin.telemetry.estimator.position_gate import PositionGate, Verdict
@@ -41,28 +41,13 @@ class MotionTrack:
     passed through unchanged at their own stamp; rougher ones, and those with other sensors, fused.
     """
 
-    def __init__(
-        self,
-        info: VehicleInfo,
-        *,
-        wheelbase_m: float = 2.7,
-        steering_ratio: float = 15.0,
-        steering_offset_rad: float = 0.0,
-    ) -> None:
-        """`steering_ratio` is steering wheel over tyre; the offset is added at the tyre."""
+    def __init__(self, info: VehicleInfo, *, steering: Steering = USUAL_STEERING) -> None:
         self._info = info
-        self._wheelbase_m = wheelbase_m
         self._lever = info.body_from_antenna_m or (0.0, 0.0, 0.0)
         self._gate = PositionGate()
-        self._measured = MotionSamples(
-            steering_ratio=steering_ratio,
-            steering_offset_rad=steering_offset_rad,
-            skipped=self._gate.skipped,
-        )
+        self._measured = MotionSamples(steering, skipped=self._gate.skipped)
         self._surprises = SurpriseCount()
-        self._corrections = MotionCorrections(
-            self._measured, self._surprises, wheelbase_m=wheelbase_m
-        )
+        self._corrections = MotionCorrections(self._measured, self._surprises)
         self._positions = PositionCorrections(
             self._measured, self._gate, self._surprises, self._lever[:2]
         )
@@ -275,7 +260,6 @@ class MotionTrack:
             *known,
             self._filter,
             convergence_rad=self._convergence_rad,
-            wheelbase_m=self._wheelbase_m,
             standing=self._standing,
             map_shift_m=self._aid.shift_m,
             overconfidence=self._positions.overconfidence,

@@ -87,7 +87,6 @@ def moving_state(
     filter_: KinematicFilter,
     *,
     convergence_rad: float,
-    wheelbase_m: float,
     standing: bool,
     map_shift_m: tuple[float, float] | None,
     overconfidence: float = 1.0,
@@ -105,7 +104,7 @@ def moving_state(
     estimated = measured.estimated(stamp_ns)
     angle = None if "tire_angle_rad" in estimated else measured.tire_angle_rad
     if angle is None:
-        angle = math.atan(wheelbase_m * filter_.mean[CURVATURE])
+        angle = math.atan(measured.wheelbase_m * filter_.mean[CURVATURE])
     variance = filter_.covariance.item
     position_std_m = (
         overconfidence * stretched.place * math.sqrt(0.5 * (variance(X, X) + variance(Y, Y)))

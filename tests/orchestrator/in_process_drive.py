@@ -25,7 +25,7 @@ from foretwin.orchestrator.runner.open_rounds import RoundDone, RoundOrder
 from foretwin.sim_worker.batch.batch_simulation import BatchSimulation
 from foretwin.sim_worker.futures.run_job import run_job
 from foretwin.sim_worker.futures.scene import SceneMaker
-from foretwin.telemetry.estimator.estimator import StateEstimator
+from foretwin.telemetry.estimator.estimator import estimator_of
 from foretwin.telemetry.logs.opening import open_log
 from foretwin.world_gen.build import build_world
 from foretwin.world_gen.junctions.map_index import index_map
@@ -83,11 +83,7 @@ class LockStep:
         self._inputs, self._log = inputs, open_log(inputs.log_file)
         self._start_ns = self._log.info.start_stamp_ns
         vehicle = inputs.vehicle
-        self._estimator = StateEstimator(
-            self._log.info, wheelbase_m=vehicle.wheelbase_m.value,
-            steering_ratio=vehicle.steering_ratio.value,
-            steering_offset_rad=vehicle.steering_offset_rad.value,
-        )  # fmt: skip
+        self._estimator = estimator_of(self._log.info, vehicle)
         self.mission = Mission(
             inputs.way_ahead(),
             MissionSettings(

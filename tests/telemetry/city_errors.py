@@ -47,9 +47,7 @@ def heard(
 ) -> Heard:
     """Return what an estimator makes of the city drive's `samples` through a network."""
     drive = city_drive()
-    estimator = StateEstimator(
-        drive.source.info, wheelbase_m=drive.source.wheelbase_m, steering_ratio=15.3
-    )
+    estimator = StateEstimator(drive.source.info, steering=drive.source.steering)
     arrivals = impaired(samples, network, clock=clock, seed=seed)
     begun_s = time.process_time()
     states = [

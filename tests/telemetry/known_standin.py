@@ -9,6 +9,8 @@ import numpy as np
 
 from foretwin.contracts.drive import VehicleState
 from foretwin.contracts.frames import GeoPoint, geo_from_local, geo_from_local_yaw
+from foretwin.geometry.steering import SteeringColumn
+from foretwin.telemetry.estimator.measured import Steering
 from foretwin.telemetry.standin.car import CarMotion
 from foretwin.telemetry.standin.sensors import PERIOD_MS
 from foretwin.telemetry.standin.source import START_STAMP_NS, StandinSource
@@ -29,9 +31,10 @@ class KnownStandin(StandinSource):
         return super()._sample(channel, stamp_ns, motion)
 
     @property
-    def wheelbase_m(self) -> float:
-        """The true wheelbase."""
-        return self._car.wheelbase_m
+    def steering(self) -> Steering:
+        """What its maker says of it."""
+        ratio = self._parameters.car.steering_ratio
+        return Steering(self._car.wheelbase_m, SteeringColumn(ratio, offset_rad=0.0))
 
     def change_tyres(self, *, softness_rad_per_mps2: float = 0.0, stiffness: float = 1.0) -> None:
         """Drive on with softer front tyres, or with another stiffness of all four."""

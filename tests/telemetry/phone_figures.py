@@ -102,9 +102,7 @@ def town_drive(seed: int, duration_s: float = DURATION_S) -> Drive:
 
 def estimated(drive: Drive, *, seed: int, std_m: float, roads: MapSeer | None = None) -> Errors:
     """Return the errors ten times a second, from samples in their order; `roads` knows a map."""
-    track = MotionTrack(
-        drive.source.info, wheelbase_m=drive.source.wheelbase_m, steering_ratio=15.3
-    )
+    track = MotionTrack(drive.source.info, steering=drive.source.steering)
     rows, due_ns = [], START_STAMP_NS
     for channel, message in phone_positions(drive, seed=seed, std_m=std_m):
         track.take(channel, message)

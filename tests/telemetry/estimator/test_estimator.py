@@ -116,9 +116,7 @@ def test_cutting_the_input_changes_nothing_before() -> None:
 
 def test_all_sensors_of_the_stand_in_are_fused_close_to_its_truth() -> None:
     source, samples = whole_drive()
-    states = states_of(
-        samples, info=source.info, wheelbase_m=source.wheelbase_m, steering_ratio=15.3
-    )
+    states = states_of(samples, info=source.info, steering=source.steering)
     valid = [state for state in states if state.yaw_valid]
     truth = [source.truth(state.stamp_ns) for state in valid]
     pairs = list(zip(valid, truth, strict=True))

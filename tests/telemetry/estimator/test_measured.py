@@ -41,6 +41,6 @@ def test_what_is_no_motion_of_a_road_vehicle_is_refused_and_counted(
     channel: str, message: SpeedSample | ImuSample | SteeringSample, why: str | None
 ) -> None:
     skipped: Counter[str] = Counter()
-    samples = MotionSamples(steering_ratio=15.0, steering_offset_rad=0.0, skipped=skipped)
+    samples = MotionSamples(skipped=skipped)
     assert samples.take(channel, message) is (why is None)
     assert skipped == ({} if why is None else {why: 1})

@@ -156,7 +156,7 @@ def test_a_car_that_would_have_its_receiver_err_as_none_does_is_where_the_receiv
 ) -> None:
     """A telephone's car once pulled away along a wrong heading, and stayed 75 m off for 100 s."""
     gate, surprises = PositionGate(), SurpriseCount()
-    measured = MotionSamples(steering_ratio=15.0, steering_offset_rad=0.0, skipped=gate.skipped)
+    measured = MotionSamples(skipped=gate.skipped)
     corrections = PositionCorrections(measured, gate, surprises, (0.0, 0.0))
     filter_ = KinematicFilter(
         xy_m=np.array([-beyond_m, 0.0]), yaw_rad=0.0, yaw_std_rad=0.1, speed_mps=10.0

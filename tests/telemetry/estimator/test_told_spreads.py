@@ -101,11 +101,11 @@ def test_an_antenna_ahead_and_a_car_that_backs_go_as_they_face(changed: dict[str
 
 
 def test_states_tell_the_spreads_stretched() -> None:
-    measured = MotionSamples(steering_ratio=15.0, steering_offset_rad=0.0, skipped=Counter())
+    measured = MotionSamples(skipped=Counter())
     filter_ = KinematicFilter(xy_m=np.zeros(2), yaw_rad=0.0, speed_mps=9.0, yaw_std_rad=0.02)
     one, other = (
         moving_state(
-            measured, "car", 0, FRAME.origin, filter_, convergence_rad=0.0, wheelbase_m=2.7,
+            measured, "car", 0, FRAME.origin, filter_, convergence_rad=0.0,
             standing=False, map_shift_m=None, stretched=stretched,
         )
         for stretched in (Stretched(1.0, 1.0, 1.0), Stretched(2.0, 3.0, 0.5))

@@ -40,9 +40,7 @@ class Gap(NamedTuple):
 def measured_gap(*, seed: int, mapped: bool) -> Gap:
     drive = town_drive(1, DURATION_S)
     roads = seer(town_streets(1, DURATION_S).legs, seed=seed) if mapped else None
-    track = MotionTrack(
-        drive.source.info, wheelbase_m=drive.source.wheelbase_m, steering_ratio=15.3
-    )
+    track = MotionTrack(drive.source.info, steering=drive.source.steering)
     recorder, states, due_ns = MotionRecorder(frame=FRAME, keep_s=1e6, depth=200_000), [], 0
     for channel, message in phone_positions(drive, seed=100 + seed):
         recorder.handle(channel, message)
