@@ -3,9 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
+from foretwin.orchestrator.routing.edge_parts import place_on
+from foretwin.orchestrator.routing.map_matching import Match
 from foretwin.orchestrator.routing.route import Route
 from foretwin.world_gen.roads.road_graph import DirectedEdge
+
+
+class FoundOnGiven(NamedTuple):
+    """The number of an edge of the given routes, and the metres along it."""
+
+    place: int
+    on_edge_m: float
 
 
 class GivenRoutes:
@@ -22,19 +32,24 @@ class GivenRoutes:
         return len(self._edges)
 
     def find(
-        self, directed: DirectedEdge, *, direction_matters: bool = True, start: int = 0
-    ) -> int | None:
-        """Return the first place of an edge from place `start` on, then from the beginning.
+        self, match: Match, *, direction_matters: bool = True, start: int = 0
+    ) -> FoundOnGiven | None:
+        """Return where a match lies, first from place `start` on, then from the beginning.
 
-        Returns None for an edge on no route, or only the other way round where that matters.
+        Returns None for one on no route, or only the other way round where that matters.
         """
+        edge = match.directed_edge
         for offset in range(len(self._edges)):
             place = (start + offset) % len(self._edges)
-            found = self._edges[place][0]
-            if found.edge.index != directed.edge.index:
+            found, s_m = self._edges[place][0], match.s_on_edge_m
+            if found.edge.index != edge.edge.index:
                 continue
-            if found.reverse == directed.reverse or not direction_matters:
-                return place
+            if found.reverse != edge.reverse:
+                if direction_matters:
+                    continue
+                s_m = edge.edge.length_m - s_m
+            if (at_m := place_on(found, s_m)) is not None:
+                return FoundOnGiven(place, at_m)
         return None
 
     def edges_from(self, place: int) -> tuple[DirectedEdge, ...]:

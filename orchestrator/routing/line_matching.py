@@ -161,7 +161,9 @@ def _driven_onto(last: EdgeVisit, hypothesis: Hypothesis) -> list[EdgeVisit]:
     """Return the visits after the last one, which is at its end unless the road was turned in."""
     step = hypothesis.near
     if not hypothesis.via and last.edge.turns_back(step.directed_edge):
-        return [EdgeVisit(step.directed_edge, last.edge.edge.length_m - last.to_m, step.s_m)]
+        length_m = last.edge.edge.length_m
+        last.to_m = max(last.to_m, length_m - step.s_m)
+        return [EdgeVisit(step.directed_edge, length_m - last.to_m, step.s_m)]
     last.to_m = last.edge.edge.length_m
     through = [EdgeVisit(edge, 0.0, edge.edge.length_m) for edge in hypothesis.via]
     return [*through, EdgeVisit(step.directed_edge, 0.0, step.s_m)]

@@ -16,7 +16,7 @@ class OtherTurns:
     def __init__(self, graph: RoadGraph, junction_at: Mapping[int, Junction]) -> None:
         self._graph = graph
         self._junction_at = junction_at
-        self._memory: tuple[tuple[int, bool, float], list[tuple[Junction, float]]] | None = None
+        self._memory: tuple[tuple[int, int, float], list[tuple[Junction, float]]] | None = None
 
     def junctions(
         self, starts: Iterable[tuple[DirectedEdge, float]], *, horizon_m: float
@@ -34,7 +34,7 @@ class OtherTurns:
 
     def _beyond(self, start: DirectedEdge, horizon_m: float) -> list[tuple[Junction, float]]:
         """Return the junctions' nodes reached from the end of `start`, with their distances."""
-        memory = (*start.key, horizon_m)
+        memory = (start.edge.index, start.end_node, horizon_m)
         if self._memory is None or self._memory[0] != memory:
             nodes = [(start.end_node, 0.0)]
             for found in reach(self._graph, start, limit_m=horizon_m, legal_only=True).values():

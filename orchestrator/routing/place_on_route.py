@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+from foretwin.orchestrator.routing.edge_parts import place_on
 from foretwin.orchestrator.routing.map_matching import Match
 from foretwin.orchestrator.routing.route import Route
 
@@ -33,8 +34,11 @@ def locate(route: Route, last: FoundOnRoute, match: Match) -> FoundOnRoute | Non
         if edge.reverse != match.directed_edge.reverse:
             if match.direction_known:
                 continue
-            s_on_edge = edge.edge.length_m - s_on_edge
-        s_m = start_m + s_on_edge
+            s_on_edge = match.directed_edge.edge.length_m - s_on_edge
+        at_m = place_on(edge, s_on_edge)
+        if at_m is None:
+            continue
+        s_m = start_m + at_m
         found = (abs(s_m - last.s_m), place, s_m)
         best = found if best is None else min(best, found)
     return None if best is None else FoundOnRoute(best[1], best[2])

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import NamedTuple
 
+from foretwin.orchestrator.routing.edge_parts import TURNED_NODE, EdgePart
 from foretwin.orchestrator.routing.given_routes import GivenRoutes
 from foretwin.orchestrator.routing.junctions_ahead import (
     PassedJunction,
@@ -157,20 +158,15 @@ class RouteFollower:
     # --- where the car is -------------------------------------------------------------------
 
     def _begin(self, match: Match) -> None:
-        edge = match.directed_edge
-        self._given_from = self.place.given_place
-        place = self._given.find(
-            edge, direction_matters=match.direction_known, start=self._given_from
-        )
+        edges: tuple[DirectedEdge, ...] = (match.directed_edge,)
         s_on_edge = match.s_on_edge_m
-        if place is not None:
-            edges = self._given.edges_from(place)
-            if edges[0].reverse != edge.reverse:
-                s_on_edge = edge.edge.length_m - s_on_edge
-            self._given_at = place
-        else:
-            edges = (edge,)
-        self._on_given = place is not None
+        self._given_from = self.place.given_place
+        known = match.direction_known
+        found = self._given.find(match, direction_matters=known, start=self._given_from)
+        if found is not None:
+            self._given_at, s_on_edge = found
+            edges = self._given.edges_from(found.place)
+        self._on_given = found is not None
         self._place = 0
         self._begun_m = self._s_m
         self._set_route(Route(edges, self._s_m - s_on_edge))
@@ -211,7 +207,8 @@ class RouteFollower:
         key = match.directed_edge.key
         best: tuple[float, int, tuple[DirectedEdge, ...]] | None = None
         for place in range(max(0, self._place - 3), min(self._place + 3, len(self._route.edges))):
-            reached = self._index.reached(self._route.edges[place]).get(key)
+            edge = self._route.edges[place]
+            reached = self._index.reached(edge).get(key) if edge.end_node != TURNED_NODE else None
             if reached is None:
                 continue
             s_m = float(self._route.start_m[place + 1]) + reached.gap_m + match.s_on_edge_m
@@ -247,13 +244,16 @@ class RouteFollower:
 
     def _rejoin(self, match: Match) -> None:
         """Take the given route up again where the car is back on it."""
-        place = self._given.find(match.directed_edge, start=self._given_from)
-        if place is None:
+        found = self._given.find(match, start=self._given_from)
+        if found is None:
             return
         assert self._route is not None
-        rest = self._given.edges_from(place)[1:]
+        first, *rest = self._given.edges_from(found.place)
+        if isinstance(first.edge, EdgePart):
+            self._begin(match)
+            return
         self._on_given = True
-        self._given_at = place - self._place
+        self._given_at = found.place - self._place
         self._set_route(Route((*self._route.edges[: self._place + 1], *rest), self._route.origin_m))
 
     # --- what lies ahead --------------------------------------------------------------------

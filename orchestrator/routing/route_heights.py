@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from foretwin.contracts.arrays import Array
+from foretwin.orchestrator.routing.edge_parts import begins_m, whole
 from foretwin.orchestrator.routing.route import Route
 from foretwin.world_gen.elevation.profiles import RoadProfiles
 
@@ -21,8 +22,8 @@ def heights_along(route: Route, at_m: Array, profiles: RoadProfiles) -> Array:
         profile = profiles.of_edge.get(directed.edge.index)
         mine = place == i
         if profile is not None and mine.any():
-            along = at_m[mine] - start_m[i]
-            length = directed.edge.length_m
+            along = at_m[mine] - start_m[i] + begins_m(directed)
+            length = whole(directed).edge.length_m
             heights[mine] = profile.height_at(length - along if directed.reverse else along)
     known = ~np.isnan(heights)
     return np.interp(at_m, at_m[known], heights[known]) if known.any() else np.zeros(len(at_m))

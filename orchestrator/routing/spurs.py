@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from itertools import pairwise
 
-from foretwin.orchestrator.routing.turning import TURN_BACK_M
+from foretwin.orchestrator.routing.edge_parts import TURN_BACK_M, part_of
 from foretwin.world_gen.roads.road_graph import DirectedEdge
 
 
@@ -33,7 +34,7 @@ class EdgeVisit:
 def without_spurs(visits: Iterable[EdgeVisit]) -> list[DirectedEdge]:
     """Return the edges of visits without those that are left for some metres by turning back.
 
-    A route has whole edges, and each of them would lead to the edge's far end and back again.
+    Where a road is driven back from between its nodes, its edges end and begin there.
     """
     kept: list[EdgeVisit] = []
     for visit in visits:
@@ -51,7 +52,11 @@ def without_spurs(visits: Iterable[EdgeVisit]) -> list[DirectedEdge]:
         del kept[0]
     if len(kept) > 1 and _turns_back(*kept[-2:]) and kept[-1].is_short:
         del kept[-1]
-    return [visit.edge for visit in kept]
+    for there, back in pairwise(kept):
+        if _turns_back(there, back) and there.to_m > there.edge.edge.length_m - TURN_BACK_M:
+            there.to_m, back.from_m = there.edge.edge.length_m, 0.0
+    kept[0].from_m, kept[-1].to_m = 0.0, kept[-1].edge.edge.length_m
+    return [part_of(visit.edge, visit.from_m, visit.to_m) for visit in kept]
 
 
 def _turns_back(one: EdgeVisit, other: EdgeVisit) -> bool:

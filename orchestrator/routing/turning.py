@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+from foretwin.orchestrator.routing.edge_parts import TURN_BACK_M
 from foretwin.orchestrator.routing.map_matching import Match
 from foretwin.orchestrator.routing.road_index import legality
 from foretwin.orchestrator.routing.route import Route, turn_angle
@@ -17,8 +18,6 @@ On the Berlin drive, predicted without a route, this lowers the mean displacemen
 and 8 s from 1.60 and 4.92 m to 1.14 and 3.95 m (12° or 20° instead: within 0.03 m).
 """
 _SHARPEST_RAD = 2.6
-TURN_BACK_M = 25.0
-"""Room to turn back: a turning circle of 12 m, or a mouth to back into. Chosen."""
 
 
 def route_with_turn(

@@ -19,6 +19,7 @@ from foretwin.contracts.frames import target_from_source_m
 from foretwin.contracts.world import World
 from foretwin.geometry.polyline import densified, headings_rad
 from foretwin.orchestrator.routing.driving_path import turn_radii
+from foretwin.orchestrator.routing.edge_parts import whole
 from foretwin.orchestrator.routing.rounding import FINE_M
 from foretwin.orchestrator.routing.route import Route
 from foretwin.world_gen.lanes.past_driveways import past_driveway
@@ -132,7 +133,7 @@ class WorldLanes:
         """
         if edge.key not in self._roads:
             ways = {edge.edge.way_id}
-            for here in (edge, edge.back):
+            for here in (whole(edge), whole(edge.back)):
                 beyond_m = 0.0
                 while beyond_m < SHORT_M and (ahead := past_driveway(self._graph, here)):
                     ways.add(ahead.edge.way_id)

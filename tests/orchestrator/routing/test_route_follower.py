@@ -3,55 +3,19 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from foretwin.contracts.frames import geo_from_local
-from foretwin.orchestrator.routing.line_matching import match_line
 from foretwin.orchestrator.routing.map_matching import MapMatcher
-from foretwin.orchestrator.routing.road_index import RoadIndex
 from foretwin.orchestrator.routing.route import Route
 from foretwin.orchestrator.routing.route_follower import RouteFollower, RouteProgress
 from foretwin.world_gen.roads.road_graph import DirectedEdge
-from tests.orchestrator.grid_map import drive, graph_of, grid, headings, junctions, road
+from tests.orchestrator.grid_map import drive, graph_of, headings, road
+from tests.orchestrator.routing.grid_driver import TOWN, Driver, route_of
 
 COVERS = (
     "foretwin.orchestrator.routing.given_routes",
     "foretwin.orchestrator.routing.junctions_ahead",
     "foretwin.orchestrator.routing.other_turns",
     "foretwin.orchestrator.routing.place_on_route",
-    "foretwin.orchestrator.routing.turning",
 )
-
-TOWN = grid(5, 4)
-JUNCTIONS = junctions(TOWN)
-INDEX = RoadIndex(TOWN)
-
-
-class Driver:
-    """Drives a follower along positions and keeps what it said."""
-
-    def __init__(self, given: tuple[Route, ...] = ()) -> None:
-        self.matcher = MapMatcher(TOWN, index=INDEX)
-        self.follower = RouteFollower(TOWN, JUNCTIONS, given, index=INDEX)
-        self.progress: list[RouteProgress | None] = []
-        self.passed: list[tuple[str, float, float]] = []
-
-    def go(self, corners: list[tuple[float, float]]) -> Driver:
-        xy = drive(corners)
-        for point, yaw in zip(xy, headings(xy), strict=True):
-            now = self.follower.update(self.matcher.update(point, yaw, True, 8.0))
-            self.progress.append(now)
-            if now is not None:
-                self.passed += [(p.junction.summary.id, *point) for p in now.passed]
-        return self
-
-    @property
-    def names(self) -> list[str]:
-        return [name for name, _, _ in self.passed]
-
-    def ahead(self, horizon_m: float = 500.0) -> list[tuple[str, int]]:
-        return [
-            (ahead.junction.summary.id, round(ahead.distance_m))
-            for ahead in self.follower.upcoming(horizon_m)
-        ]
 
 
 def along(*steps: tuple[int, bool]) -> Route:
@@ -197,40 +161,6 @@ def test_leaving_a_given_route_is_told_and_rejoining_it_too() -> None:
     assert off.off_route
     assert not back.off_route
     assert driver.names == ["n102", "n103", "n203"]
-
-
-def route_of(corners: list[tuple[float, float]]) -> tuple[Route, ...]:
-    lat_lon_deg = np.asarray(geo_from_local(TOWN.frame, drive(corners)))
-    return match_line(TOWN, lat_lon_deg, index=INDEX).routes
-
-
-@pytest.mark.parametrize(
-    "there",
-    [
-        [(150, 98), (150, 104)],
-        [(200, 98), (206, 100), (200, 104)],
-        [(190, 98), (193, 100), (190, 104)],
-        [(196, 98), (200, 92), (204, 98), (204, 104)],
-        [(196, 98), (202, 90), (202, 84), (198, 84), (198, 104)],
-    ],
-    ids=["on the road", "at a node", "before a node", "round a corner", "by a side street"],
-)
-def test_a_car_that_turns_back_as_its_log_did_never_leaves_its_route(
-    there: list[tuple[float, float]],
-) -> None:
-    corners = [(20.0, 98.0), *there, (20.0, 103.0)]
-    driver = Driver(route_of(corners)).go(corners)
-
-    assert [now for now in driver.progress if now is None or now.off_route] == []
-    assert driver.names[-1] == "n102"
-
-
-def test_a_car_that_drives_on_where_its_route_turns_back_has_left_it() -> None:
-    driver = Driver(route_of([(20, 98), (200, 98), (206, 100), (200, 104), (20, 103)]))
-    driver.go([(20, 98), (240, 98)])
-
-    assert driver.progress[-1] is not None
-    assert driver.progress[-1].off_route
 
 
 def test_of_a_road_driven_three_times_the_next_time_is_foreseen() -> None:
