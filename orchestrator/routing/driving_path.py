@@ -29,6 +29,7 @@ from foretwin.orchestrator.routing.rounding import (
     normals,
     simplified,
     smoothed,
+    turned_round,
     turns,
     with_driven_bends,
     with_driven_turns,
@@ -126,6 +127,10 @@ def _centre_line(route: Route, first: int, last: int) -> tuple[Array, Array]:
         points.append(line[keep])
         places.append(float(route.start_m[number]) + arc[keep])
     line, s = np.concatenate(points), np.concatenate(places)
+    for number in range(first, last):
+        if route.edges[number].turns_back(route.edges[number + 1]):
+            left = 1.0 if route.edges[number].edge.driving_side == "right" else -1.0
+            line, s = turned_round(line, s, float(route.start_m[number + 1]), left=left)
     kept = apart(line, tolerance_m=0.05)
     line, s = line[kept], s[kept]
     bends = without_straight(line, s)
@@ -187,6 +192,8 @@ def _next_turn(route: Route, number: int) -> float:
     for after in range(number + 1, len(route.edges)):
         before = route.edges[max(0, after - 4) : after]
         turn = turn_angle(before, route.edges[after])
+        if before[-1].turns_back(route.edges[after]):
+            turn = math.pi if before[-1].edge.driving_side == "right" else -math.pi
         if abs(turn) > TURN_RAD:
             return turn
         length_m += route.edges[after].edge.length_m

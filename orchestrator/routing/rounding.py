@@ -10,7 +10,7 @@ from scipy.ndimage import gaussian_filter1d, minimum_filter1d
 
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.frames import wrap_angle
-from foretwin.geometry.polyline import arc_lengths, interpolated, left_of, tangents
+from foretwin.geometry.polyline import arc_lengths, interpolated, left_of, tangents, unit
 from foretwin.geometry.steering import DRIVEN_CURVATURE_PM
 from foretwin.geometry.turn_curves import turn_curves
 
@@ -46,6 +46,9 @@ TURN_WITHIN_M, TURNED_RAD = 30.0, math.radians(45.0)
 """What turns more within so many metres is a turn at a junction, and stays as sharp as it is."""
 TURN_ROOM_M = 12.0
 """A wider turn begins and ends so far from the tight one at most."""
+TURN_ROUND_M, TURN_ROUND_ASIDE_M = 15.0, 7.0
+"""A car that turns back in its road leaves its line so far before, and by so much to either side:
+a turning circle of 12 m. Chosen."""
 
 
 def clip(line: Array, s: Array, window: tuple[float, float]) -> tuple[Array, Array]:
@@ -85,6 +88,23 @@ def without_straight(line: Array, s: Array) -> list[int]:
     return [int(index) for index in np.flatnonzero(keep)]
 
 
+def turned_round(line: Array, s: Array, at_m: float, *, left: float) -> tuple[Array, Array]:
+    """Return a line that goes back along itself from `at_m`, swung out there as a car turns round.
+
+    To its other side first and then to the left, or to the right with `left` -1.
+    """
+    near = [at_m - TURN_ROUND_M, at_m, at_m + TURN_ROUND_M]
+    begin, tip, end = interpolated(np.array(near), s, line)
+    aside = left * TURN_ROUND_ASIDE_M * left_of(unit(tip - begin))
+    before, after = s < near[0], s > near[2]
+    swung = [begin, tip - aside, tip + aside, end]
+    places = [near[0], at_m - TURN_ROUND_ASIDE_M, at_m + TURN_ROUND_ASIDE_M, near[2]]
+    return (
+        np.concatenate([line[before], swung, line[after]]),
+        np.concatenate([s[before], np.clip(places, s[0], s[-1]), s[after]]),
+    )
+
+
 def fillet(line: Array, s: Array, radius: Array) -> tuple[Array, Array]:
     """Replace corners by arcs of `radius` (N - 2,), or less where the legs are too short for it."""
     legs = np.diff(line, axis=0)
@@ -122,10 +142,9 @@ def fillet(line: Array, s: Array, radius: Array) -> tuple[Array, Array]:
     of_arcs = np.repeat(round_off, times)
     points[of_arcs] = centre[arc] + arc_radius[arc, None] * spread
     places[of_arcs] = evenly(at_m - reach_m, at_m + reach_m)
-    return (
-        np.concatenate([line[:1], points, line[-1:]]),
-        np.concatenate([s[:1], places, s[-1:]]),
-    )
+    # Where the line swings out it is longer than its s, and two arcs may lie on the same of that.
+    rising = np.maximum.accumulate(np.concatenate([s[:1], places, s[-1:]]))
+    return np.concatenate([line[:1], points, line[-1:]]), rising
 
 
 def smoothed(points: Array, deviation_m: float) -> Array:

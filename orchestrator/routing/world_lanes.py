@@ -20,7 +20,7 @@ from foretwin.contracts.world import World
 from foretwin.geometry.polyline import densified, headings_rad
 from foretwin.orchestrator.routing.driving_path import turn_radii
 from foretwin.orchestrator.routing.edge_parts import whole
-from foretwin.orchestrator.routing.rounding import FINE_M
+from foretwin.orchestrator.routing.rounding import FINE_M, TURN_ROUND_M
 from foretwin.orchestrator.routing.route import Route
 from foretwin.world_gen.lanes.past_driveways import past_driveway
 from foretwin.world_gen.roads.joined_edges import SHORT_M
@@ -110,9 +110,14 @@ class WorldLanes:
         spans: dict[tuple[int, bool], list[tuple[float, float]]] = {}
         for number in range(first, last + 1):
             edge = route.edges[number]
-            span = float(route.start_m[number]), float(route.start_m[number + 1])
+            begin, end = float(route.start_m[number]), float(route.start_m[number + 1])
+            # Who turns back in the road swings out of its lanes there.
+            if number > first and route.edges[number - 1].turns_back(edge):
+                begin += EDGE_SLACK_M + TURN_ROUND_M
+            if number < last and edge.turns_back(route.edges[number + 1]):
+                end -= EDGE_SLACK_M + TURN_ROUND_M
             for road in self._roads_of(edge):
-                spans.setdefault(road, []).append(span)
+                spans.setdefault(road, []).append((begin, end))
         found = {}
         for piece in self._pieces:
             if piece.road is not None and piece.road in spans:

@@ -9,12 +9,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from foretwin.contracts.arrays import Array
+from foretwin.contracts.world import DrivingSide
+from foretwin.geometry.steering import MAX_CURVATURE_PM
 from foretwin.orchestrator.routing.driving_path import (
     FAR_TURN_RADIUS_M,
     KERB_TURN_RADIUS_M,
     PathGeometry,
     driving_path,
 )
+from foretwin.orchestrator.routing.edge_parts import part_of
 from foretwin.orchestrator.routing.route import Route
 from foretwin.world_gen.roads.road_graph import DirectedEdge, RoadEdge, RoadGraph
 from tests.orchestrator.grid_map import graph_of, grid, road
@@ -190,6 +193,25 @@ def test_any_sequence_of_turns_gives_a_steerable_evenly_spaced_path(
     assert (np.diff(path.s_m) > 0.0).all()
     assert np.abs(curvature(path)).max() < 0.25
     assert curvature(path).sum() == pytest.approx(sum(turns), abs=0.15)
+
+
+@pytest.mark.parametrize("side", ["right", "left"])
+def test_who_turns_back_in_the_road_does_so_there_and_across_it(side: DrivingSide) -> None:
+    graph = graph_of([straight((1.0, 1.0))], driving_side=side)
+    (edge,) = graph.edges
+    there, back = DirectedEdge(edge, False), DirectedEdge(edge, True)
+    end_m = edge.length_m
+    turned_m = 0.6 * end_m
+    parts = part_of(there, 0.0, turned_m), part_of(back, end_m - turned_m, end_m)
+    path = whole(graph, Route(parts))
+    farthest = int(path.xy_m[:, 0].argmax())
+
+    assert path.xy_m[farthest, 0] == pytest.approx(edge.xy_m[0, 0] + turned_m, abs=2.0)
+    assert path.s_m[farthest] == pytest.approx(turned_m, abs=2.0)
+    assert (np.diff(path.s_m) >= 0.0).all()
+    turn = curvature(path)[farthest - 3 : farthest + 4]
+    assert (np.sign(turn) == (1.0 if side == "right" else -1.0)).all()
+    assert np.abs(turn).max() < MAX_CURVATURE_PM
 
 
 def test_a_stretch_off_the_route_is_refused() -> None:

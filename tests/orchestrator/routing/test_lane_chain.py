@@ -14,6 +14,7 @@ from foretwin.contracts.frames import target_from_source_m
 from foretwin.contracts.world import World
 from foretwin.geometry.polyline import arc_lengths
 from foretwin.orchestrator.routing.driving_path import PathGeometry, driving_path
+from foretwin.orchestrator.routing.edge_parts import part_of
 from foretwin.orchestrator.routing.lane_chain import BLEND_M, LaneGuide, LaneRun, on_lanes
 from foretwin.orchestrator.routing.rounding import TIGHT_M, curvature_pm, normals
 from foretwin.orchestrator.routing.route import Route
@@ -171,6 +172,19 @@ def test_beyond_the_world_the_path_joins_the_road_smoothly() -> None:
     (run,) = guide.runs
     assert run.s_m[[0, -1]] == pytest.approx([50.0, 150.0], abs=1.0)
     assert np.abs(np.diff(np.unwrap(_headings(town.path.xy_m)))).max() < math.radians(1.0)
+
+
+def test_who_turns_back_in_the_road_leaves_the_lane_to_do_so_there() -> None:
+    town = Town(crossing(), EAST)
+    there, out = town.route.edges
+    back_m = out.edge.length_m - 60.0
+    turned = part_of(out, 0.0, 60.0), part_of(out.back, back_m, out.edge.length_m)
+    town.route = Route((there, *turned, there.back))
+    town.guided((-20.0, -1.6))
+
+    assert town.path is not None
+    assert town.path.xy_m[:, 0].max() == pytest.approx(60.0, abs=2.0)
+    assert np.abs(curvature_pm(town.path.xy_m)).max() < 1.0 / 3.0
 
 
 def test_a_route_that_no_lane_follows_keeps_its_path() -> None:
