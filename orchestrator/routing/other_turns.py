@@ -7,16 +7,22 @@ from collections.abc import Iterable, Iterator, Mapping
 from foretwin.orchestrator.routing.junctions_ahead import UpcomingJunction
 from foretwin.orchestrator.routing.road_index import reach
 from foretwin.world_gen.junctions.intersections import Junction
-from foretwin.world_gen.roads.road_graph import DirectedEdge, RoadGraph
+from foretwin.world_gen.roads.road_graph import DirectedEdge, EdgeKey, RoadGraph
+from foretwin.world_gen.roads.turn_restrictions import TurnRestrictions
 
 
 class OtherTurns:
     """Follows every legal turn from a road; remembers the answer while the road is the same."""
 
-    def __init__(self, graph: RoadGraph, junction_at: Mapping[int, Junction]) -> None:
-        self._graph = graph
+    def __init__(
+        self,
+        graph: RoadGraph,
+        junction_at: Mapping[int, Junction],
+        restrictions: TurnRestrictions,
+    ) -> None:
+        self._graph, self._restrictions = graph, restrictions
         self._junction_at = junction_at
-        self._memory: tuple[tuple[int, int, float], list[tuple[Junction, float]]] | None = None
+        self._memory: tuple[tuple[EdgeKey, int, float], list[tuple[Junction, float]]] | None = None
 
     def junctions(
         self, starts: Iterable[tuple[DirectedEdge, float]], *, horizon_m: float
@@ -34,10 +40,11 @@ class OtherTurns:
 
     def _beyond(self, start: DirectedEdge, horizon_m: float) -> list[tuple[Junction, float]]:
         """Return the junctions' nodes reached from the end of `start`, with their distances."""
-        memory = (start.edge.index, start.end_node, horizon_m)
+        memory = (start.key, start.end_node, horizon_m)
         if self._memory is None or self._memory[0] != memory:
             nodes = [(start.end_node, 0.0)]
-            for found in reach(self._graph, start, limit_m=horizon_m, legal_only=True).values():
+            legal = reach(self._graph, start, limit_m=horizon_m, lawful=self._restrictions)
+            for found in legal.values():
                 end_m = found.gap_m + found.directed_edge.edge.length_m
                 nodes.append((found.directed_edge.end_node, end_m))
             junctions = [

@@ -11,6 +11,7 @@ import shapely
 
 from foretwin.contracts.arrays import Array
 from foretwin.world_gen.roads.road_graph import DirectedEdge, EdgeKey, RoadGraph
+from foretwin.world_gen.roads.turn_restrictions import TurnRestrictions
 
 NOT_FOR_CARS_FACTOR = 2.0
 AGAINST_ONE_WAY_FACTOR = 4.0
@@ -139,12 +140,16 @@ class RoadIndex:
 
 
 def reach(
-    graph: RoadGraph, start: DirectedEdge, *, limit_m: float, legal_only: bool = False
+    graph: RoadGraph,
+    start: DirectedEdge,
+    *,
+    limit_m: float,
+    lawful: TurnRestrictions | None = None,
 ) -> dict[EdgeKey, Reached]:
     """Search outward from the end of `start` (Dijkstra on directed edges) up to `limit_m` of road.
 
-    Forbidden ground counts longer than it is and turning round costs `U_TURN_M`; with `legal_only`
-    both are left out.
+    Forbidden ground counts longer than it is and turning round costs `U_TURN_M`; for who drives
+    `lawful`ly both are left out, and so are turns that these restrictions forbid.
     """
     result: dict[EdgeKey, Reached] = {}
     queue: list[tuple[float, int, float, DirectedEdge, tuple[DirectedEdge, ...]]] = []
@@ -154,7 +159,12 @@ def reach(
         nonlocal count
         for step in graph.at_node(last.end_node):
             turned = last.turns_back(step)
-            if legal_only and (turned or legality(step) != "car"):
+            if lawful is not None and (
+                turned
+                or legality(step) != "car"
+                or not lawful.step_allowed(last, step)
+                or not lawful.path_allowed((start, *via, step))
+            ):
                 continue
             heapq.heappush(queue, (effort + (U_TURN_M if turned else 0.0), count, gap, step, via))
             count += 1

@@ -64,7 +64,7 @@ class RouteFollower:
         self._graph, self._restrictions = graph, restrictions
         self._index = index or RoadIndex(graph)
         self._junction_at = {node: junction for junction in junctions for node in junction.nodes}
-        self._other_turns = OtherTurns(graph, self._junction_at)
+        self._other_turns = OtherTurns(graph, self._junction_at, restrictions)
         self._given = GivenRoutes(given)
         self._route: Route | None = None
         self._place = 0

@@ -10,6 +10,7 @@ from foretwin.orchestrator.routing.map_matching import MapMatcher
 from foretwin.orchestrator.routing.road_index import RoadIndex
 from foretwin.orchestrator.routing.route import Route
 from foretwin.orchestrator.routing.route_follower import RouteFollower, RouteProgress
+from foretwin.world_gen.roads.turn_restrictions import UNRESTRICTED, TurnRestrictions
 from tests.orchestrator.grid_map import drive, grid, headings, junctions
 
 TOWN = grid(5, 4)
@@ -20,9 +21,13 @@ INDEX = RoadIndex(TOWN)
 class Driver:
     """Drives a follower along positions and keeps what it said."""
 
-    def __init__(self, given: tuple[Route, ...] = ()) -> None:
+    def __init__(
+        self, given: tuple[Route, ...] = (), *, restrictions: TurnRestrictions = UNRESTRICTED
+    ) -> None:
         self.matcher = MapMatcher(TOWN, index=INDEX)
-        self.follower = RouteFollower(TOWN, JUNCTIONS, given, index=INDEX)
+        self.follower = RouteFollower(
+            TOWN, JUNCTIONS, given, index=INDEX, restrictions=restrictions
+        )
         self.progress: list[RouteProgress | None] = []
         self.passed: list[tuple[str, float, float]] = []
 

@@ -7,6 +7,7 @@ from foretwin.orchestrator.routing.map_matching import MapMatcher
 from foretwin.orchestrator.routing.route import Route
 from foretwin.orchestrator.routing.route_follower import RouteFollower, RouteProgress
 from foretwin.world_gen.roads.road_graph import DirectedEdge
+from foretwin.world_gen.roads.turn_restrictions import TurnRestrictions, TurnRule
 from tests.orchestrator.grid_map import drive, graph_of, headings, road
 from tests.orchestrator.routing.grid_driver import TOWN, Driver, route_of
 
@@ -189,6 +190,27 @@ def test_other_turns_within_reach_are_told_for_building_worlds_ahead() -> None:
     assert ("n203", 140) in others
     assert ("n3", 140) in others
     assert "n103" not in [name for name, _ in others]
+
+
+NO_RIGHT_TURN = TurnRule(1, 1005, (), frozenset({1022}), only=False, u_turn=False)
+"""From the second street's way to the one that leads south at its third node."""
+THEN_NO_RIGHT_TURN = TurnRule(2, 1005, (1022,), frozenset({1001}), only=False, u_turn=False)
+
+
+@pytest.mark.parametrize(
+    "restrictions",
+    [
+        TurnRestrictions({103: (NO_RIGHT_TURN,)}, ()),
+        TurnRestrictions({}, (THEN_NO_RIGHT_TURN,)),
+    ],
+    ids=["at a node", "over a way"],
+)
+def test_a_turn_that_a_restriction_forbids_is_no_other_turn(restrictions: TurnRestrictions) -> None:
+    def found(driver: Driver) -> set[str]:
+        driver.go([(120, 100), (160, 100)])
+        return {one.junction.summary.id for one in driver.follower.alternatives(250)}
+
+    assert "n2" in found(Driver()) - found(Driver(restrictions=restrictions))
 
 
 def test_off_the_map_ends_the_route_and_the_return_begins_a_new_one() -> None:
