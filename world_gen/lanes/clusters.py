@@ -27,6 +27,7 @@ from foretwin.world_gen.lanes.places import whole_where_led_through
 from foretwin.world_gen.lanes.ring_curves import ring_curves
 from foretwin.world_gen.lanes.transitions import transition_shifts
 from foretwin.world_gen.lanes.trims import trims
+from foretwin.world_gen.roads.conditional_tags import condition_notes
 from foretwin.world_gen.roads.headings import heading_out
 from foretwin.world_gen.roads.joined_edges import read_tags
 from foretwin.world_gen.roads.node_notes import barrier_notes, level_crossing_notes, level_notes
@@ -144,6 +145,7 @@ def surroundings(
             *level_notes((graph.edges[i] for i in edges), graph.passed_over),
             *level_crossing_notes((graph.edges[i] for i in edges), index.osm.node_tags),
             *tidal_notes(edges.values()),
+            *condition_notes(edges.values()),
             *_side_notes(edges, side),
             *_beyond_notes(made_for, edges, cut_m, extent),
         ),

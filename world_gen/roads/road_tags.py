@@ -12,14 +12,16 @@ _MOTOR_SPORTS = frozenset({"motor", "motor_sports", "motor_racing", "autocross",
 """What races on a track for cars; kart, horse, bicycle and motocross tracks are none."""
 RING_TAGS = frozenset({"roundabout", "circular"})
 
-_FORBIDDEN = frozenset(
+FORBIDDEN = frozenset(
     {
         *("no", "private", "permit", "agricultural", "forestry", "emergency", "official"),
         *("military", "bus", "psv", "taxi", "hgv", "bicycle", "foot"),
     }
 )
 """Values that leave the public's cars out; those of kinds of traffic let these alone through."""
-_ACCESS_KEYS = ("motorcar", "motor_vehicle", "vehicle", "access")
+ACCESS_KEYS = ("motorcar", "motor_vehicle", "vehicle", "access")
+ONEWAY_KEYS = ("oneway:motor_vehicle", "oneway:vehicle", "oneway")
+"""Tags that open roads to cars, and one way round, the most specific first."""
 
 
 class Directions(NamedTuple):
@@ -53,10 +55,10 @@ def is_kept_road(tags: Mapping[str, str]) -> bool:
 
 def open_to_cars(tags: Mapping[str, str]) -> bool:
     """Tell whether cars of the public may use the road, by its most specific access tag."""
-    for key in _ACCESS_KEYS:
+    for key in ACCESS_KEYS:
         value = tags.get(key)
         if value is not None and value != "unknown":
-            return any(part.strip() not in _FORBIDDEN for part in value.split(";"))
+            return any(part.strip() not in FORBIDDEN for part in value.split(";"))
     return tags.get("highway") not in ("pedestrian", "busway")
 
 
@@ -80,8 +82,7 @@ def is_tidal(tags: Mapping[str, str]) -> bool:
 
 
 def _oneway(tags: Mapping[str, str]) -> str:
-    keys = ("oneway:motor_vehicle", "oneway:vehicle", "oneway")
-    return next((tags[key] for key in keys if tags.get(key)), "")
+    return next((tags[key] for key in ONEWAY_KEYS if tags.get(key)), "")
 
 
 class LaneCounts(NamedTuple):
