@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import heapq
 import itertools
+import math
 from collections.abc import Iterator
 from typing import NamedTuple
 
@@ -69,9 +70,13 @@ class RoadsDriven:
         way, start, end, side = lane.id.split(".")
         nodes = int(start), int(end)
         a, b = nodes if side[0] == "f" else nodes[::-1]
-        return _Along(a, b, self._by_name[int(way[1:]), a, b])
+        line = self._by_name.get((int(way[1:]), a, b))
+        # Past driveways a World's road is of several edges.
+        if line is None:
+            line = np.concatenate(self._between(a, b, farthest_m=math.inf))
+        return _Along(a, b, line)
 
-    def _between(self, start: int, end: int) -> list[np.ndarray]:
+    def _between(self, start: int, end: int, *, farthest_m: float = FARTHEST_M) -> list[np.ndarray]:
         order = itertools.count()
         heap: list[tuple[float, int, int, list[np.ndarray]]] = [(0.0, next(order), start, [])]
         seen: set[int] = set()
@@ -79,7 +84,7 @@ class RoadsDriven:
             at_m, _, node, lines = heapq.heappop(heap)
             if node == end:
                 return lines
-            if node in seen or at_m > FARTHEST_M:
+            if node in seen or at_m > farthest_m:
                 continue
             seen.add(node)
             for other, line, length_m in self._onward.get(node, ()):

@@ -9,6 +9,7 @@ import pytest
 
 from foretwin.world_gen.roads.build_graph import build_road_graph
 from tests.world_gen.drawn_maps import CROSS, drawn_map, world_of
+from tests.world_gen.lanes.test_past_driveways import beside
 from tests.world_gen.measure_turns import ALLOWED_RAD, beside_m, turns_of
 from tests.world_gen.roads_driven import RoadsDriven
 
@@ -52,6 +53,19 @@ def test_roads_lie_where_the_lanes_of_a_world_end() -> None:
         before, behind = roads.lines(start, end)
         assert math.dist(before[0], start.centerline[-1]) < 2.0
         assert math.dist(behind[-1], end.centerline[0]) < 2.0
+
+
+def test_a_road_that_goes_on_past_driveways_is_found_whole() -> None:
+    osm = beside(12.0)
+    world = world_of(osm)
+    roads = RoadsDriven(build_road_graph(osm), world.frame)
+    lanes = {lane.id: lane for lane in world.lanes}
+    (one,) = (c for c in world.connections if c.id.startswith("w13.") and ">w11." in c.id)
+    end = lanes[one.to_lane_id]
+    _, behind = roads.lines(lanes[one.from_lane_id], end)
+
+    assert end.id.startswith("w11.0.1.")
+    assert math.dist(behind[-1], end.centerline[0]) < 2.0
 
 
 def test_such_a_turn_leaves_the_angle_of_its_lanes_and_not_that_of_its_roads() -> None:
