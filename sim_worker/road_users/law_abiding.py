@@ -12,15 +12,20 @@ from typing import NamedTuple
 import numpy as np
 
 from foretwin.contracts.arrays import Array, Flags, Indices
+from foretwin.geometry.rectangles import Rectangles, overlapping
 from foretwin.sim_worker import driver_model as driver
 from foretwin.sim_worker.road_users.compiled import FIELDS, find_ahead, take_nearest
 from foretwin.sim_worker.road_users.crowd import Crowd, EgoBoxes
 from foretwin.sim_worker.road_users.noticed import Noticed
-from foretwin.sim_worker.road_users.path_table import PathTable
+from foretwin.sim_worker.road_users.path_table import OnPaths, PathTable
 from foretwin.sim_worker.road_users.right_of_way import PathRules
 
 _BESIDE_M = 0.3
 _CURVE_AHEAD_M = 15.0
+_NEAR_M, _ALONGSIDE_COS = 15.0, 0.94
+"""Who stands nearer than this and is turned by 20° or more is looked at as it stands."""
+_SWEPT_M: Array = np.arange(0.0, _NEAR_M + 10.0, 0.5)
+"""Of the own path, places whose ground is held against who stands near."""
 _AS_FAST_MPS, _CAUGHT_UP_SHARE = 1.0, 2.0
 """Who is nearly as fast as another, and within twice the gap that it wants, follows it."""
 
@@ -52,7 +57,7 @@ class LawAbiding:
         self._crowd, self._table, self._rules = crowd, table, rules
         self._path = crowd.path_of[s, r]
         self._on = table.on(self._path)
-        self._half = 0.5 * crowd.length_m[s, r]
+        self._half, self._lateral = 0.5 * crowd.length_m[s, r], crowd.lateral_m[s, r]
         self._width = crowd.width_m[s, r]
         self._decel, self._most = crowd.decel_mps2[s, r], crowd.accel_mps2[s, r]
         self._time_gap, self._lag = crowd.time_gap_s[s, r], crowd.lag_s[s, r]
@@ -78,7 +83,7 @@ class LawAbiding:
         s, r, decel, most = self.rows, self.columns, self._decel, self._most
         arc, speed = now.arc_m[s, r], now.speed_mps[s, r]
         bend = self._bend(arc)
-        gap, lead_speed = self._leader(now, ego, bend)
+        gap, lead_speed = self._leader(now, ego, arc, bend)
         self._look_first(gap, speed, lead_speed)
         red = red_arcs_m[self._path] if red_arcs_m.ndim == 2 else red_arcs_m[s, self._path]
         line = self._before(red, arc, speed)
@@ -160,10 +165,11 @@ class LawAbiding:
         there = self._table.headings(self._table.place(self._on, arc + _CURVE_AHEAD_M))
         return np.asarray((there - here) / _CURVE_AHEAD_M)
 
-    def _leader(self, now: Now, ego: EgoBoxes, bend: Array) -> tuple[Array, Array]:
+    def _leader(self, now: Now, ego: EgoBoxes, arc: Array, bend: Array) -> tuple[Array, Array]:
         """Return the gap to the lead in the own lane, infinite without one, and its speed.
 
-        Others are looked for beside the parabola that the own path bends along.
+        Others are looked for beside the parabola that the own path bends along; by that alone
+        drivers at a junction stand for each other where there is room to pass, and for good.
         """
         crowd = self._crowd
         x, y, yaw = now.poses[self.rows, self.columns].T
@@ -175,10 +181,36 @@ class LawAbiding:
             (driver.SIGHT_M, _BESIDE_M), self._who, self._found,
         )  # fmt: skip
         who, found = self._who[:count], self._found[:, :count]
+        close = (np.abs(found[5]) < driver.STANDING_MPS) & (found[0] < _NEAR_M)
+        close &= np.cos(found[2]) < _ALONGSIDE_COS
         gap, speed = np.full(len(x), np.inf), np.zeros(len(x))
+        if close.any():
+            self._stand_by(gap, arc, mine, who[close], found[:, close])
+            who, found = who[~close], found[:, ~close]
         turned = found[2]
         take_nearest(who, found, np.cos(turned), np.sin(turned), mine, _BESIDE_M, gap, speed)
         return gap, speed
+
+    def _stand_by(self, gap_m: Array, arc: Array, mine: Array, who: Indices, found: Array) -> None:
+        """Lower gaps (K,) to those who stand near and turned, as `find_ahead` has them: to where
+        the own way first touches their boxes, which reach far less far than along its heading."""
+        ahead, beside, turned, length, width, _ = found
+        x, y, yaw, cos, sin, half_bend = mine[:6, who]
+        left = beside + half_bend * np.square(ahead)
+        middle = np.stack([x + cos * ahead - sin * left, y + sin * ahead + cos * left], axis=-1)
+        stands = Rectangles(
+            middle[:, None], (yaw + turned)[:, None], length[:, None], width[:, None]
+        )
+        on = OnPaths._make(column[who, None] for column in self._on)
+        place = self._table.place(on, arc[who, None] + _SWEPT_M)
+        poses = self._table.poses(
+            place, np.broadcast_to(self._lateral[who, None], place.node.shape)
+        )
+        wide = self._width[who, None] + 2.0 * _BESIDE_M
+        swept = Rectangles(poses[..., :2], poses[..., 2], 2.0 * self._half[who, None], wide)
+        touches = overlapping(swept, stands)
+        first_m = np.where(touches.any(axis=1), _SWEPT_M[touches.argmax(axis=1)], np.inf)
+        np.minimum.at(gap_m, who, first_m)
 
     def _wait(self, now: Now, ego: EgoBoxes, arc: Array, speed: Array) -> Array:
         """Return how far ground lies ahead that must be left to others, else infinite."""

@@ -16,6 +16,7 @@ from tests.sim_worker.road_users.crossroads import (
     FAR_EGO,
     centre_arc,
     crossroads,
+    path_of,
     run,
     straight_on,
     traffic,
@@ -159,3 +160,23 @@ def test_what_was_seen_at_first_is_known_when_others_begin_anew(tmp_path: Path) 
     after.step(time_s=np.zeros((2, 1)), dt_s=1.0)
     assert after.speed_mps[0, 1] > 8.5
     assert after.speed_mps[1, 1] == pytest.approx(8.0, abs=0.05)
+
+
+def test_who_turns_gets_past_one_that_stands_turned_beside_its_way(tmp_path: Path) -> None:
+    """More than a metre to its left; along the heading of who turns, it would be in the way."""
+    world = crossroads(tmp_path)
+    turns = next(
+        path_of(world, one)
+        for one in world.connections
+        if one.turn == "left" and one.centerline[0, 0] < -5.0 and one.centerline[-1, 1] > 5.0
+    )
+    yaw = math.radians(-159.0)
+    beside = FrenetPath(
+        np.array([-4.5, 2.6]) + np.outer([-99.0, 99.0], [math.cos(yaw), math.sin(yaw)])
+    )
+    before_m = [12.0, centre_arc(beside) - 99.0]
+    moving = traffic(
+        world, [turns, beside], before_m=before_m, speed_mps=[0.0, 0.0], lawful=[True, False]
+    )
+    seen = run(moving, seconds=12.0)[:, 0]
+    assert seen[-1, 0] > centre_arc(turns) + 10.0
