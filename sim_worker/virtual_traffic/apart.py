@@ -109,7 +109,8 @@ def _pairs(ways: _Ways) -> tuple[Indices, Indices, Array]:
     one, other = np.nonzero(np.triu(away_m < reach_m[:, None] + reach_m, 1))
     nobody = np.zeros(len(ways.size_m), dtype=bool)
     now = _Ways(ways.poses[:, :, :1], ways.size_m)
-    room_m = np.broadcast_to(_ROOM_M, (len(one), 2))
+    # No more room than way: else who stands beside another and has room to get past stays there.
+    room_m = np.minimum(_ROOM_M, (made_m[one] + made_m[other])[:, None])
     close = now.meet(one, other, nobody, room_m)[:, 0]
     touch = now.meet(one, other, nobody, 0.0 * room_m)[:, 0]
     room_m = np.where(close[:, None], 0.0, room_m)

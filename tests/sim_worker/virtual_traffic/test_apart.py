@@ -106,3 +106,9 @@ def test_nobody_drives_into_anybody_in_half_a_minute(seed: int) -> None:
     met = {pair for scene in scenes[::2] for pair in touching(scene)}
     assert met == set()
     assert sum(one.speed_mps for scene in scenes for one in scene) * STEP_S > 16 * 30.0
+
+
+def test_who_has_room_to_get_past_one_that_stands_does_not_brake_for_the_room_beside_it() -> None:
+    """0.15 m of room beside it, and half a metre until their boxes are alongside."""
+    creeps = (EAST, 100.0 - 4.5 - 0.505, 0.2)
+    assert must_brake(traffic_of(creeps, (np.add(EAST, [0.0, 1.95]), 100.0, 0.0))) == [False, False]
