@@ -29,7 +29,7 @@ class Taken(NamedTuple):
     from_arc_m: float
 
 
-class _Stretch(NamedTuple):
+class SharedStretch(NamedTuple):
     """A conflict area on both its connections, arc lengths along either: waiting one first."""
 
     wait_in_m: float
@@ -42,12 +42,21 @@ class JunctionRules:
     """The rules of one World, ready for any paths through it."""
 
     def __init__(self, world: World | None) -> None:
+        self._world = world
         self._connections = () if world is None else world.connections
         lines = [connection.centerline for connection in self._connections]
         self._probes = np.array([_probe(line) for line in lines]).reshape(-1, 3, 3)
-        self._stretches: dict[tuple[str, str], _Stretch] = {}
+        self._stretches: dict[tuple[str, str], SharedStretch] = {}
         if world is not None:
-            self._stretches = _stretches(world)
+            self._stretches = _stretches(world, lit=False)
+
+    def grounds(self) -> dict[tuple[str, str], tuple[SharedStretch, bool]]:
+        """Return all ground that two connections share, by their ids, and whether the first waits
+        for the second by rule, and not by lights alone."""
+        if self._world is None:
+            return {}
+        every = _stretches(self._world, lit=True)
+        return {pair: (stretch, pair in self._stretches) for pair, stretch in every.items()}
 
     def taken(self, path: FrenetPath) -> tuple[Taken, ...]:
         """Return the connections that `path` follows, in its order."""
@@ -153,16 +162,17 @@ def _probe(line: Array) -> Array:
     return np.column_stack([points_at(line, at), np.arctan2(steps[step, 1], steps[step, 0])])
 
 
-def _stretches(world: World) -> dict[tuple[str, str], _Stretch]:
-    """Return for each pair (who waits, who goes) the ground they share along their paths."""
+def _stretches(world: World, *, lit: bool) -> dict[tuple[str, str], SharedStretch]:
+    """Return for each pair (who waits, who goes) the ground they share along their paths; with
+    `lit` also of those whom lights keep apart."""
     by_id = {connection.id: connection for connection in world.connections}
     waits: list[Connection] = []
     goes: list[Connection] = []
     outlines = []
     for conflict in world.conflicts:
         first, second = by_id[conflict.first_id], by_id[conflict.second_id]
-        lit = first.signal_group_id is not None and second.signal_group_id is not None
-        if lit and conflict.rule not in _GREEN_KEEPS:
+        both = first.signal_group_id is not None and second.signal_group_id is not None
+        if both and not lit and conflict.rule not in _GREEN_KEEPS:
             continue
         first_waits = conflict.yields_id == first.id
         waits.append(first if first_waits else second)
@@ -174,7 +184,7 @@ def _stretches(world: World) -> dict[tuple[str, str], _Stretch]:
     areas = shapely.make_valid(np.array([shapely.Polygon(one) for one in outlines], dtype=object))
     spans = np.hstack([_spans(waits, areas), _spans(goes, areas)])
     return {
-        (wait.id, go.id): _Stretch(*span)
+        (wait.id, go.id): SharedStretch(*span)
         for wait, go, span in zip(waits, goes, spans.tolist(), strict=True)
     }
 

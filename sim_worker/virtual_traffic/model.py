@@ -1,7 +1,8 @@
 """The traffic model as a going simulation: law-abiding drivers who flow along the lanes of Worlds.
 
 They follow, stop and give way as those of futures do (`road_users`), to each other and to the car;
-who would drive into somebody all the same brakes in time (`apart`).
+junctions they enter only where they can leave them (`entries`), and who would drive into somebody
+all the same brakes in time (`apart`).
 Who gets far away from the car goes, and another comes where the car cannot see it come.
 """
 
@@ -36,6 +37,7 @@ from foretwin.sim_worker.scenarios.seen import LaneSearch
 from foretwin.sim_worker.vehicle.reference_points import box_centre_from_base_m
 from foretwin.sim_worker.vehicle.road_user_kinds import KINDS
 from foretwin.sim_worker.virtual_traffic.apart import who_must_brake
+from foretwin.sim_worker.virtual_traffic.entries import JunctionEntries, Mover
 from foretwin.sim_worker.virtual_traffic.rider import Rider, RoadsInForce
 from foretwin.sim_worker.virtual_traffic.source import FIRST_M, STEP_S, UNSEEN_M, VirtualUser
 
@@ -91,6 +93,7 @@ class ModelTraffic:
             network, LaneSearch(tuple(network.lanes.values())), JunctionRules(world)
         )
         self._roads, self._car_path, self._stale = roads, None, True
+        self._entries = JunctionEntries(roads.rules)
         for rider in self._riders:
             assert before is not None
             rider.move_into(world.frame, before.network.world.frame, roads.rules)
@@ -137,7 +140,9 @@ class ModelTraffic:
         grip_mps2 = self._grip_left()
         if self._steps % _EVERY == 0 or colours != self._colours:
             self._colours = dict(colours)
-            traffic.decide(boxes, self._rules.red(colours), watch_lights=True)
+            red = self._rules.red(colours)
+            closed = self._entries.closed(traffic, boxes, red)
+            traffic.decide(boxes, np.hstack([red, closed]), watch_lights=True)
             traffic.brake_at_most(grip_mps2)
         traffic.brake(who_must_brake(traffic, boxes, grip_mps2), grip_mps2)
         traffic.step(time_s=time_s - STEP_S, dt_s=STEP_S)
@@ -251,6 +256,12 @@ class ModelTraffic:
             columns: Indices = np.array([self._columns.get(one.name, -1) for one in self._riders])
             shifts = np.array([rider.shifted_m for rider in self._riders])
             traffic.take_over(self._traffic, columns, shifts)
+        self._entries.use(
+            [
+                Mover("", self._car_taken, self._size_m),
+                *(Mover(one.name, one.taken, one.size_m) for one in self._riders),
+            ]
+        )
         for rider in self._riders:
             rider.shifted_m = 0.0
         self._traffic, self._rules = traffic, rules
