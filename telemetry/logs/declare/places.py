@@ -78,13 +78,14 @@ def places_of(columns: dict[str, Array], time_s: Array) -> list[list[Place]]:
     new = _Changes(lively)
     if ecef := _ecef(lively, time_s, new):
         return [ecef]
-    utm, plane = _plane(lively, time_s, new)
-    if utm:
+    if utm := _plane(lively, time_s, new, of_utm=True):
         return [utm]
     angles = _geographic(lively, time_s, new)
     # Plain degrees as minutes, and a heading beside them, move as a car does now and then.
     if plain := [place for place in angles if place.unit in _PLAIN_ANGLES]:
         return [plain]
+    # Last: of many columns thousands of pairs move as a car does in some unit of length.
+    plane = _plane(lively, time_s, new, of_utm=False)
     return [found for found in (angles, plane) if found]
 
 
@@ -178,8 +179,11 @@ def _ecef(columns: dict[str, Array], time_s: Array, new: _Changes) -> list[Place
         for name, values in columns.items()
         if np.nanmax(np.abs(values)) < _EARTH_M[1] and np.nanstd(values) < _WITHIN_M
     }
+    long = {name for name in far if np.nanmax(np.abs(far[name])) > _EARTH_M[0] / math.sqrt(3.0)}
     found = []
     for names in itertools.combinations(far, 3):
+        if long.isdisjoint(names):
+            continue
         rows, alike = new.common(names)
         if alike < _TOGETHER:
             continue
@@ -199,14 +203,11 @@ def _ecef(columns: dict[str, Array], time_s: Array, new: _Changes) -> list[Place
     return found
 
 
-def _plane(
-    columns: dict[str, Array], time_s: Array, new: _Changes
-) -> tuple[list[Place], list[Place]]:
-    """Return readings as UTM or the like; those as another grid, else as lengths from somewhere.
+def _plane(columns: dict[str, Array], time_s: Array, new: _Changes, *, of_utm: bool) -> list[Place]:
+    """Return readings as UTM or the like; or those as another grid, else as lengths from somewhere.
 
     They are feet where they are called so, else metres; the latter may be km, cm or mm.
     """
-    utm: list[Place] = []
     grid: list[Place] = []
     near: list[Place] = []
     for east, north in itertools.permutations(columns, 2):
@@ -217,20 +218,19 @@ def _plane(
         feet = FEET.search(east) and FEET.search(north)
         for unit in ("ft",) if feet else ("m", "km", "cm", "mm"):
             xy_m = raw * units.LENGTH[unit]
-            if not _moves_like_a_car(time_s[rows], xy_m):
-                continue
             x_m, y_m = (float(value) for value in np.median(xy_m, axis=0))
-            fields = {"easting": east, "northing": north}
-            kind, found = "projected", grid
+            in_east = unit in ("m", "ft") and _UTM_EAST_M[0] < x_m < _UTM_EAST_M[1]
+            if (in_east and _UTM_NORTH_M[0] < y_m < _UTM_NORTH_M[1]) != of_utm:
+                continue
+            kind, fields, found = "projected", {"easting": east, "northing": north}, grid
             if math.hypot(x_m, y_m) < _FAR_M:
                 kind, fields, found = "local", {"x": east, "y": north}, near
             elif unit not in ("m", "ft"):
                 continue
-            elif _UTM_EAST_M[0] < x_m < _UTM_EAST_M[1] and _UTM_NORTH_M[0] < y_m < _UTM_NORTH_M[1]:
-                found = utm
-            places = _place(kind, fields, unit, rows, xy_m - (x_m, y_m), time_s, None, alike)
-            found += [place._replace(centre_m=(x_m, y_m)) for place in places]
-    return utm, grid or near
+            if _moves_like_a_car(time_s[rows], xy_m):
+                places = _place(kind, fields, unit, rows, xy_m - (x_m, y_m), time_s, None, alike)
+                found += [place._replace(centre_m=(x_m, y_m)) for place in places]
+    return grid or near
 
 
 def _place(

@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
 from foretwin.contracts.arrays import Array
+from foretwin.telemetry.logs.declare import places
+from foretwin.telemetry.logs.declare.motion import GridMotion, motion_of
 from foretwin.telemetry.logs.declare.places import places_of
 
 METRE_DEG = 1.0 / 111_195.0
@@ -53,6 +56,32 @@ def test_along_a_straight_road_one_coordinate_hardly_changes() -> None:
     columns = {"lat": lat.astype(np.float32) * 1.0, "lon": lon.astype(np.float32) * 1.0}
     together = np.mean((np.diff(columns["lat"]) != 0) & (np.diff(columns["lon"]) != 0))
     assert 0.3 < together < 0.6
-    places = [place for found in places_of(columns, time_s) for place in found]
-    assert {"latitude": "lat", "longitude": "lon"} in [place.fields for place in places]
-    assert {place.unit for place in places} == {"deg"}
+    found = [place for alike in places_of(columns, time_s) for place in alike]
+    assert {"latitude": "lat", "longitude": "lon"} in [place.fields for place in found]
+    assert {place.unit for place in found} == {"deg"}
+
+
+def test_beside_plain_degrees_no_pair_of_columns_is_looked_at_as_lengths(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """What a car's own bus tells wanders as cars do: of fifty columns thousands of pairs."""
+    time_s = np.arange(600.0)
+    yaw = np.cumsum(0.05 * np.sin(time_s / 15.0))
+    north, east = np.cumsum(9.0 * np.sin(yaw)), np.cumsum(9.0 * np.cos(yaw))
+    columns = {
+        "lat": 48.1 + north * METRE_DEG,
+        "lon": 11.6 + east * METRE_DEG / np.cos(np.radians(48.1)),
+    }
+    for number in range(50):
+        columns[f"pid{number}"] = 20.0 + number + 9.0 * np.sin(time_s / (3.0 + 0.1 * number))
+    looked_at = 0
+
+    def counted(time_s: Array, xy_m: Array) -> GridMotion | None:
+        nonlocal looked_at
+        looked_at += 1
+        return motion_of(time_s, xy_m)
+
+    monkeypatch.setattr(places, "motion_of", counted)
+    ((*found,),) = places_of(columns, time_s)
+    assert {"latitude": "lat", "longitude": "lon"} in [place.fields for place in found]
+    assert looked_at == len(found) < 10
