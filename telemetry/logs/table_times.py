@@ -32,6 +32,10 @@ StampOf = Callable[[str], int | None]
 DAY_NS = 86_400 * 10**9
 _ZONE = r"(Z|UTC|GMT|[+-]\d{2}:?\d{2})"
 _DATE = re.compile(r"(\d{1,4})([./-])(\d{1,2})\2(\d{1,4})(?:[T ,;]+(.+))?")
+_NAMED = re.compile(r"(\d{1,2})[./ -]+([^\W\d_]{3,9})[./ -]+(\d{2}|\d{4})(?![^T ,;])")
+_MONTHS = ["jan", "feb", "mar", "apr", "may", "jun", "jul", "aug", "sep", "oct", "nov", "dec"]
+_IN_GERMAN = {"mär": "mar", "mrz": "mar", "mai": "may", "okt": "oct", "dez": "dec"}
+"""How names of months begin."""
 _TIME = re.compile(
     r"(\d{1,2}):(\d{2}):(\d{2})(?:[.,:](\d{1,9}))?\s*([AaPp])?(?:\.?[Mm]\.?)?"
     rf"\s*{_ZONE}?"
@@ -43,6 +47,8 @@ def stamp_reader(unit: str, decimal: str = ".") -> StampOf:
     """Return what turns a cell into ns, since 1970 or since midnight; None of what is no time."""
     if unit == units.ISO_TIME:
         return lambda text: stamp_ns_from_iso(text.strip())
+    if unit == "dmy":
+        return lambda text: _date_ns(_NAMED.sub(_with_number, text.strip(), 1), DATES[unit])
     if unit in DATES:
         return lambda text: _date_ns(text.strip(), DATES[unit])
     if unit == CLOCK:
@@ -111,6 +117,13 @@ def _date_ns(text: str, order: tuple[int, int, int]) -> int | None:
     if of_day_ns is None:
         return None
     return representable_ns((date - _EPOCH).days * DAY_NS + of_day_ns)
+
+
+def _with_number(date: re.Match[str]) -> str:
+    """Return a date whose month is named, with that month's number; 0 where it is none."""
+    begins = date[2][:3].lower()
+    begins = _IN_GERMAN.get(begins, begins)
+    return f"{date[1]}.{_MONTHS.index(begins) + 1 if begins in _MONTHS else 0}.{date[3]}"
 
 
 def _time_ns(text: str) -> int | None:
