@@ -13,7 +13,7 @@ import numpy as np
 
 from foretwin.telemetry.logs.declare.likeness import SURE, likeness
 from foretwin.telemetry.logs.declare.motion import GridMotion, on_grid
-from foretwin.telemetry.logs.declare.names import called
+from foretwin.telemetry.logs.declare.names import called, called_alike
 from foretwin.telemetry.logs.declare.places import Place
 from foretwin.telemetry.logs.declare.roles import ROLES, fits_of, heading_of, without_reverse
 from foretwin.telemetry.logs.declare.sensors import ChangingColumn
@@ -71,12 +71,13 @@ def chosen_place(
     rivals = [one for one in wanted if one & group]
     if len(rivals) > 1 and best_of(rivals[1])[0] < _PLAINLY * best_of(group)[0]:
         named = {
-            one: max(called(p.fields) for p in places if frozenset(p.fields.values()) == one)
+            one: max((called(p.fields), called_alike(p.fields.values())) for p in places
+                     if frozenset(p.fields.values()) == one)
             for one in rivals
-        }
-        rivals.sort(key=lambda one: -named[one])
+        }  # fmt: skip
+        rivals = [one for one in rivals if named[one] == max(named.values())]
         group = rivals[0]
-        if named[rivals[0]] == named[rivals[1]]:
+        if len(rivals) > 1:
             first = next(iter(places[0].fields))
             names = sorted({place.fields[first] for place in places
                             if frozenset(place.fields.values()) in rivals})  # fmt: skip

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import itertools
 import re
+from collections.abc import Iterable
 
 import numpy as np
 
@@ -43,6 +45,19 @@ def called(fields: dict[str, str]) -> int:
         along = 2 * (bool(EAST.search(column)) - bool(NORTH.search(column)))
         found += {"x": along, "easting": along, "y": -along, "northing": -along}.get(field, 0)
     return found
+
+
+def called_alike(names: Iterable[str]) -> float:
+    """Return how much of two names is the same at both ends, as of columns of one receiver."""
+    one, other = sorted((name.lower() for name in names), key=len)
+    before = _begins_alike(one, other)
+    after = _begins_alike(one[before:][::-1], other[before:][::-1])
+    return (before + after) / len(other)
+
+
+def _begins_alike(one: str, other: str) -> int:
+    pairs = zip(one, other, strict=False)
+    return sum(1 for _ in itertools.takewhile(lambda pair: pair[0] == pair[1], pairs))
 
 
 def altitude_of(columns: dict[str, Array]) -> str | None:

@@ -52,3 +52,30 @@ def test_feet_are_feet_and_a_gyro_is_no_steering(data_dir: Path, tmp_path: Path)
     read, truth = drive_of(open_log(path))["gnss"].columns, drive["gnss"].columns
     for name in ("latitude", "longitude"):
         assert read[name] == pytest.approx(truth[name], abs=1e-8)
+
+
+def test_of_two_receivers_columns_those_that_are_called_alike_belong_together(
+    tmp_path: Path,
+) -> None:
+    """As in logs of an app that tells the telephone's place and that of its receiver's driver."""
+    time_s = np.arange(600.0)
+    yaw = np.cumsum(0.05 * np.sin(time_s / 15.0))
+    speed = 9.0 + 4.0 * np.sin(time_s / 20.0)
+    north, east = np.cumsum(speed * np.sin(yaw)), np.cumsum(speed * np.cos(yaw))
+    lat, lon = 48.1 + north / 111_195.0, 11.6 + east / 111_195.0 / np.cos(np.radians(48.1))
+    rows = [
+        f"{one_lat:.9f},{one_lon:.9f},{3.6 * fast:.3f},{one_lat:.7f},{one_lon:.7f},{at:.1f}"
+        for one_lat, one_lon, fast, at in zip(lat, lon, speed, time_s, strict=True)
+    ]
+    names = "Latitude,Longitude,Speed,GPS Latitude,GPS Longitude,Time"
+    path = tmp_path / "app.csv"
+    path.write_text("\n".join([names, *rows, ""]))
+    found = propose(path)
+    assert found.question is None
+    assert found.declaration is not None
+    position = found.declaration.position
+    assert position is not None
+    assert position.latitude is not None
+    assert position.longitude is not None
+    pair = (position.latitude.column, position.longitude.column)
+    assert pair in [("Latitude", "Longitude"), ("GPS Latitude", "GPS Longitude")]
