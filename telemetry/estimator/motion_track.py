@@ -16,10 +16,15 @@ from foretwin.telemetry.estimator.innovations import SurpriseCount
 from foretwin.telemetry.estimator.kinematic_filter import KinematicFilter
 from foretwin.telemetry.estimator.local_place import LocalPlace
 from foretwin.telemetry.estimator.map_aid import MapAid, RoadLine
-from foretwin.telemetry.estimator.measured import USUAL_STEERING, MotionSamples, Steering
+from foretwin.telemetry.estimator.measured import (
+    CLOCK_LEAP_NS,
+    USUAL_STEERING,
+    MotionSamples,
+    Steering,
+)
 from foretwin.telemetry.estimator.motion_corrections import MotionCorrections
 from foretwin.telemetry.estimator.position_corrections import PositionCorrections
-from foretwin.telemetry.estimator.position_gate import PositionGate, Verdict
+from foretwin.telemetry.estimator.position_gate import MAX_SPEED_MPS, PositionGate, Verdict
 from foretwin.telemetry.estimator.reported_state import (
     StateConsistency,
     consistency_of,
@@ -221,8 +226,11 @@ class MotionTrack:
 
     def _advance(self, stamp_ns: int) -> KinematicFilter | None:
         if self._filter is not None and stamp_ns > self._filter_stamp_ns:
+            silent_ns = stamp_ns - self._filter_stamp_ns
             # After a long silence the motion is unknown: two seconds of it are enough.
-            self._filter.predict(min((stamp_ns - self._filter_stamp_ns) * 1e-9, 2.0))
+            self._filter.predict(min(silent_ns * 1e-9, 2.0))
+            if silent_ns > CLOCK_LEAP_NS:
+                self._filter.doubt_position(MAX_SPEED_MPS * silent_ns * 1e-9)
             self._filter_stamp_ns = stamp_ns
         return self._filter
 

@@ -169,3 +169,20 @@ def test_a_car_that_would_have_its_receiver_err_as_none_does_is_where_the_receiv
 
     assert filter_.mean[X] == pytest.approx(0.0, abs=0.1)
     assert filter_.mean[GNSS_X] == pytest.approx(0.0, abs=0.1)
+
+
+def test_after_a_hole_the_car_is_where_the_next_fixes_say() -> None:
+    """A recorder that stops at 16 m/s and goes on three minutes later, parked 1.4 km away."""
+    samples: list[Sample] = []
+    for tick in range(40):
+        time_s = 0.5 * tick
+        samples.append(("speed", SpeedSample(stamp_ns=round(time_s * 1e9), speed_mps=16.0)))
+        samples.append(fix(time_s, 16.0 * time_s, 0.0, 0.8))
+    for tick in range(8):
+        time_s = 194.0 + 0.5 * tick
+        samples.append(("speed", SpeedSample(stamp_ns=round(time_s * 1e9), speed_mps=0.0)))
+        samples.append(fix(time_s, 1700.0, 300.0, 0.8))
+    after = [state for state in states_of(samples) if state.stamp_ns > 194.2e9]
+    assert len(after) >= 7
+    for state in after:
+        assert xy(state) == pytest.approx((1700.0, 300.0), abs=3.0)
