@@ -82,10 +82,10 @@ def propose(
     if question is not None:
         return Proposal(declaration=None, question=question)
     assert sensors is not None
-    if clock.counts and not sensors.fits:
+    if clock.counts and not sensors.fits and "time_unit" not in answers:
         raise LogError(
             f"{path}: column {clock.column!r} counts rows, and no other is their time: nothing says"
-            " how long a row lasts"
+            f" how long a row lasts; where it is a time, say --answer time_unit={clock.unit}"
         )
     found = _written(table, clock, chosen, frame, framed, sensors, answers)
     found.unknown.extend(f"{copy}: the same as {first}" for copy, first in copies.items())

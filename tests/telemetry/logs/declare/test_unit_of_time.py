@@ -82,3 +82,22 @@ def test_a_unit_of_time_can_be_answered(tmp_path: Path) -> None:
         propose(path, answers={"time_unit": "us"})
     with pytest.raises(LogError, match="time_unit=days1900: no column is a time in that"):
         propose(path, answers={"time_unit": "days1900"})
+
+
+def test_a_time_that_grows_by_one_is_taken_where_its_unit_is_answered(tmp_path: Path) -> None:
+    """Seconds of the week beside positions alone, as of a receiver's own software."""
+    time_s = np.arange(300)
+    yaw = np.cumsum(0.05 * np.sin(time_s / 15.0))
+    lat = 48.1 + np.cumsum(9.0 * np.sin(yaw)) / 111_195.0
+    lon = 11.6 + np.cumsum(9.0 * np.cos(yaw)) / 111_195.0 / np.cos(np.radians(48.1))
+    rows = [
+        f"{456_250 + at},{one:.8f},{other:.8f}"
+        for at, one, other in zip(time_s, lat, lon, strict=True)
+    ]
+    path = tmp_path / "week.csv"
+    path.write_text("\n".join(["sow,lat,lon", *rows, ""]))
+    with pytest.raises(LogError, match=r"counts rows.*--answer time_unit=s"):
+        propose(path)
+    found = propose(path, answers={"time_unit": "s"}).declaration
+    assert found is not None
+    assert (found.time.column, found.time.unit) == ("sow", "s")
