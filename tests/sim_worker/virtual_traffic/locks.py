@@ -1,4 +1,4 @@
-"""`python -m tests.sim_worker.virtual_traffic.locks [--count N]`: how model traffic gets on.
+"""`python -m tests.sim_worker.virtual_traffic.locks [--count N] [--seeds N]`: how traffic gets on.
 
 In four junctions of the drawn town, a roundabout, one with a stop sign, one with lights and one
 that gives way, beside a car that stays 6 m beside a road: prints for each run how many metres all
@@ -30,10 +30,11 @@ def main() -> None:
     """Run it, and print what came of it."""
     parser = argparse.ArgumentParser(prog="python -m tests.sim_worker.virtual_traffic.locks")
     parser.add_argument("--count", type=int, default=12)
+    parser.add_argument("--seeds", type=int, default=2)
     parser.add_argument("--seconds", type=float, default=240.0)
     asked = parser.parse_args()
     town, runs = foretwin.drawn_town(), []
-    for junction, seed in itertools.product(JUNCTIONS, (1, 2)):
+    for junction, seed in itertools.product(JUNCTIONS, range(1, asked.seeds + 1)):
         found = measured(town.world(junction), asked.count, seed, asked.seconds)
         runs.append(found)
         print(
