@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import itertools
+import math
 
 import numpy as np
 import pytest
@@ -14,7 +15,7 @@ from foretwin.orchestrator.routing.arrival import (
     DrivingPace,
     predict_arrivals,
 )
-from foretwin.orchestrator.routing.going_on import UNHINDERED_S, USUAL_SHARE
+from foretwin.orchestrator.routing.going_on import FADING_S, UNHINDERED_S, USUAL_SHARE
 from foretwin.orchestrator.routing.junctions_ahead import UpcomingJunction
 from foretwin.orchestrator.routing.route import Route
 from foretwin.world_gen.roads.road_graph import DirectedEdge
@@ -50,6 +51,18 @@ def test_a_driver_who_is_faster_than_usual_arrives_earlier() -> None:
 
     assert fast.share == pytest.approx(13.5 / LIMIT_MPS, abs=0.01)
     assert seconds(fast, 900.0) == pytest.approx([900.0 / 13.5], rel=0.02)
+
+
+def test_what_a_car_loses_now_fades_as_the_law_says() -> None:
+    """Against the law in steps of a millisecond."""
+    pace = pace_at(4.0, seconds=20)
+    wanted_mps, speed, way_m, at_s = pace.share * LIMIT_MPS, 4.0, 0.0, 0.0
+    while way_m < 40.0:
+        left = math.exp(-at_s / FADING_S)
+        speed += 1e-3 * (-0.5 * left + (1.0 - left) * (wanted_mps - speed) / UNHINDERED_S)
+        way_m, at_s = way_m + 1e-3 * speed, at_s + 1e-3
+
+    assert seconds(pace, 40.0, accel_mps2=-0.5) == pytest.approx([at_s], rel=6e-3)
 
 
 def test_who_was_held_up_is_expected_to_drive_as_usual_again() -> None:

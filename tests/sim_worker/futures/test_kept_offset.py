@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import msgspec
 import numpy as np
 import pytest
 
 from foretwin.contracts.beside_road import Building
 from foretwin.contracts.futures import COLLISION_WITH, Future, FuturesResult
+from foretwin.contracts.world import Area
 from foretwin.geometry.frenet_path import FrenetPath
 from foretwin.sim_worker.batch.batch_simulation import BatchSimulation
 from foretwin.sim_worker.futures.kept_offset import ROOM_M, kept_offset_m
@@ -14,6 +16,7 @@ from foretwin.sim_worker.futures.run_job import run_job
 from foretwin.sim_worker.scenarios.impact import ego_box
 from foretwin.sim_worker.scenarios.walls import Walls
 from foretwin.sim_worker.vehicle.parameters import load_vehicle
+from foretwin.world_gen.ground.islands import RING_ISLAND
 from tests.sim_worker.places import box, crossroads, job, state_at, straight_path
 
 CAR = load_vehicle()
@@ -50,6 +53,16 @@ def test_it_comes_as_near_to_what_stands_as_leaves_it_room() -> None:
     free_m = 0.45
     kept = kept_m(beside(0.0, HALF_M + free_m + ROOM_M), offset_m=0.8)
     assert free_m - 0.8 / 8.0 < kept <= free_m
+
+
+def test_the_middle_of_a_ring_stops_cars_and_a_refuge_does_not() -> None:
+    found = []
+    for name in (RING_ISLAND, "island:refuge"):
+        outline = beside(0.0, HALF_M + 0.45 + ROOM_M).outline
+        world = msgspec.structs.replace(crossroads(), islands=(Area(id=name, outline=outline),))
+        car = ego_box(CAR, FrenetPath(straight_path().xy_m), 10.0, 0.8)
+        found.append(kept_offset_m(Walls(world), car, from_m=20.0, upto_m=150.0))
+    assert found == [pytest.approx(0.4), 0.8]
 
 
 def test_what_stands_on_the_other_side_or_farther_on_moves_nobody() -> None:
