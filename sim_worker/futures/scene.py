@@ -17,7 +17,7 @@ from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.contracts.world import World
 from foretwin.geometry.frenet_path import FrenetPath
 from foretwin.sim_worker.futures.aims import Aims, aims_of, bend_accel_of, limit_share
-from foretwin.sim_worker.futures.kept_offset import kept_offset_m
+from foretwin.sim_worker.futures.clear_offsets import clear_offsets_m
 from foretwin.sim_worker.futures.lights import Lights, lights_of
 from foretwin.sim_worker.futures.number_columns import NumberColumns, number_columns
 from foretwin.sim_worker.metrics.ground import DrivableGround
@@ -154,15 +154,16 @@ class SceneMaker:
             # Ways may be long, and cross themselves.
             place = path.locate(starts[:, :2], near_arc_m=start_arc_m)
         numbers = number_columns(job.futures)
-        kept_m = place.offset_m.copy()
+        aims = aims_of(job, place.offset_m, numbers)
         if job.starts is None and (here := [row for row in range(count) if row not in staged]):
             from_m, speed_mps = float(place.arc_m[here[0]]), float(starts[here[0], 3])
-            car = ego_box(vehicle, path, speed_mps, float(kept_m[here[0]]))
-            reach_m = job.horizon_s * max(speed_mps, job.cruise_speed_mps)
-            kept_m[here] = kept_offset_m(
-                self.network.walls, car, from_m=from_m + MIN_LOOKAHEAD_M, upto_m=from_m + reach_m
+            aims.offset_m[here] = clear_offsets_m(
+                self.network.walls,
+                ego_box(vehicle, path, speed_mps),
+                aims.offset_m[here],
+                from_m=from_m + MIN_LOOKAHEAD_M,
+                upto_m=from_m + job.horizon_s * max(speed_mps, job.cruise_speed_mps),
             )
-        aims = aims_of(job, kept_m, numbers)
         live = any(v.scenario_id and not v.place for v in job.futures)
         on_path = self.scenarios.on(path, float(place.arc_m[0]), vehicle) if live else None
         seen = self._seen.actors(job.road_users)

@@ -11,7 +11,7 @@ from foretwin.contracts.futures import COLLISION_WITH, Future, FuturesResult
 from foretwin.contracts.world import Area
 from foretwin.geometry.frenet_path import FrenetPath
 from foretwin.sim_worker.batch.batch_simulation import BatchSimulation
-from foretwin.sim_worker.futures.kept_offset import ROOM_M, kept_offset_m
+from foretwin.sim_worker.futures.clear_offsets import ROOM_M, clear_offsets_m
 from foretwin.sim_worker.futures.run_job import run_job
 from foretwin.sim_worker.scenarios.impact import ego_box
 from foretwin.sim_worker.scenarios.walls import Walls
@@ -31,9 +31,10 @@ def beside(x_m: float, edge_m: float) -> Building:
 
 def kept_m(*standing: Building, offset_m: float, upto_m: float = 150.0) -> float:
     path = FrenetPath(straight_path().xy_m)
-    car = ego_box(CAR, path, 10.0, offset_m)
     walls = Walls(crossroads(buildings=standing))
-    return kept_offset_m(walls, car, from_m=20.0, upto_m=upto_m)
+    asked = np.array([offset_m])
+    (found,) = clear_offsets_m(walls, ego_box(CAR, path, 10.0), asked, from_m=20.0, upto_m=upto_m)
+    return float(found)
 
 
 def played(*standing: Building, y_m: float) -> FuturesResult:
@@ -60,9 +61,18 @@ def test_the_middle_of_a_ring_stops_cars_and_a_refuge_does_not() -> None:
     for name in (RING_ISLAND, "island:refuge"):
         outline = beside(0.0, HALF_M + 0.45 + ROOM_M).outline
         world = msgspec.structs.replace(crossroads(), islands=(Area(id=name, outline=outline),))
-        car = ego_box(CAR, FrenetPath(straight_path().xy_m), 10.0, 0.8)
-        found.append(kept_offset_m(Walls(world), car, from_m=20.0, upto_m=150.0))
+        car = ego_box(CAR, FrenetPath(straight_path().xy_m), 10.0)
+        asked = np.array([0.8])
+        found += clear_offsets_m(Walls(world), car, asked, from_m=20.0, upto_m=150.0).tolist()
     assert found == [pytest.approx(0.4), 0.8]
+
+
+def test_each_of_several_aims_stays_where_it_is_clear() -> None:
+    walls = Walls(crossroads(buildings=(beside(0.0, HALF_M + 0.45 + ROOM_M),)))
+    car = ego_box(CAR, FrenetPath(straight_path().xy_m), 10.0)
+    asked = np.array([-0.9, 0.1, 0.3, 0.6, 0.8])
+    found = clear_offsets_m(walls, car, asked, from_m=20.0, upto_m=150.0)
+    np.testing.assert_allclose(found, [-0.9, 0.1, 0.3, 0.4, 0.4])
 
 
 def test_what_stands_on_the_other_side_or_farther_on_moves_nobody() -> None:
@@ -73,6 +83,14 @@ def test_what_stands_on_the_other_side_or_farther_on_moves_nobody() -> None:
 
 def test_where_the_path_leads_into_a_house_the_map_is_wrong_and_the_car_stays() -> None:
     assert kept_m(beside(0.0, -0.5), offset_m=0.8) == 0.8
+
+
+def test_who_would_drive_a_little_farther_left_aims_at_no_kerb_either() -> None:
+    world = crossroads(buildings=(beside(0.0, HALF_M + 0.5),))
+    shifted = Future(index=0, name="shift", numbers={"lateral_shift_m": 0.9})
+    stage = BatchSimulation(world, CAR, nsim=1)
+    result = run_job(job((shifted,), state=state_at(-50.0, PATH_Y_M, speed=8.0)), stage)
+    assert COLLISION_WITH[int(result.outcome.collision_with[0])] == ""
 
 
 def test_the_nominal_future_passes_an_island_that_the_cars_offset_leads_into() -> None:
