@@ -12,6 +12,7 @@ import shapely
 
 from foretwin.contracts.arrays import Array
 from foretwin.contracts.frames import LocalFrame, geo_from_local
+from foretwin.contracts.world import World
 from foretwin.geometry.polyline import Flags, arc_lengths, length, points_at
 
 MIN_PIECE_M = 0.5
@@ -34,8 +35,8 @@ class Disc(msgspec.Struct, frozen=True, dict=True):
         return shapely.Point(0.0, 0.0).buffer(self.radius_m, quad_segs=32)
 
     def holds(self, xy_m: Array) -> Flags:
-        """Return for points (N, 2) whether they lie inside, as (N,) of bool."""
-        inside: Flags = np.hypot(xy_m[:, 0], xy_m[:, 1]) <= self.radius_m
+        """Return for points (…, 2) whether they lie inside, as (…) of bool."""
+        inside: Flags = np.hypot(xy_m[..., 0], xy_m[..., 1]) <= self.radius_m
         return inside
 
     def crossings(self, xy_m: Array) -> list[float]:
@@ -78,10 +79,10 @@ class Rectangle(msgspec.Struct, frozen=True):
         return shapely.box(self.west_m, self.south_m, self.east_m, self.north_m)
 
     def holds(self, xy_m: Array) -> Flags:
-        """Return for points (N, 2) whether they lie inside, as (N,) of bool."""
+        """Return for points (…, 2) whether they lie inside, as (…) of bool."""
         west_m, south_m, east_m, north_m = self.bounds_m
         low, high = xy_m >= (west_m, south_m), xy_m <= (east_m, north_m)
-        return np.asarray((low & high).all(axis=1))
+        return np.asarray((low & high).all(axis=-1))
 
     def crossings(self, xy_m: Array) -> list[float]:
         """Return arc lengths at which a polyline (N, 2) meets the lines of the edge."""
@@ -96,6 +97,11 @@ class Rectangle(msgspec.Struct, frozen=True):
 
 
 Extent = Disc | Rectangle
+
+
+def extent_of(world: World) -> Extent:
+    """Return where a World ends."""
+    return Disc(world.radius_m) if world.bounds_m is None else Rectangle(*world.bounds_m)
 
 
 def stretches_inside(xy_m: Array, extent: Extent) -> list[tuple[float, float]]:

@@ -33,8 +33,9 @@ from foretwin.orchestrator.routing.road_line import RoadLines
 from foretwin.orchestrator.routing.route import Route
 from foretwin.orchestrator.routing.route_follower import PlaceOnRoute, RouteFollower, RouteProgress
 from foretwin.orchestrator.routing.speed_ahead import WaySpeeds, speeds_ahead, way_speeds
-from foretwin.orchestrator.routing.world_lanes import WorldLanes, inside
+from foretwin.orchestrator.routing.world_lanes import WorldLanes
 from foretwin.telemetry.estimator.map_aid import RoadLine
+from foretwin.world_gen.extent import extent_of
 from foretwin.world_gen.junctions.intersections import Junction
 from foretwin.world_gen.roads.road_graph import RoadGraph
 from foretwin.world_gen.roads.turn_restrictions import UNRESTRICTED, TurnRestrictions
@@ -242,7 +243,7 @@ class WayAhead:
             onto_lanes=guide.onto_lanes,
         )
         xy = target_from_source_m(world.frame, self._graph.frame, geometry.xy_m)
-        off_lanes = inside(world, xy) & guide.without_lanes(geometry.s_m)
+        off_lanes = extent_of(world).holds(xy) & guide.without_lanes(geometry.s_m)
         self.off_lanes_m = SPACING_M * int(np.count_nonzero(off_lanes))
         path = PathAhead(xy_m=xy, speed_limit_mps=geometry.speed_limit_mps)
         driven_mps = None

@@ -11,7 +11,6 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 from scipy.spatial import cKDTree
 
 from foretwin.contracts.arrays import Array
@@ -145,14 +144,6 @@ class WorldLanes:
                     beyond_m, here = beyond_m + ahead.edge.length_m, ahead
             self._roads[edge.key] = frozenset((way, edge.reverse) for way in ways)
         return self._roads[edge.key]
-
-
-def inside(world: World, xy_m: Array) -> npt.NDArray[np.bool_]:
-    """Return which of the points (N, 2) in a World's frame it covers."""
-    if world.bounds_m is None:
-        return np.asarray(np.hypot(xy_m[:, 0], xy_m[:, 1]) < world.radius_m)
-    west, south, east, north = world.bounds_m
-    return np.asarray(((xy_m > (west, south)) & (xy_m < (east, north))).all(axis=1))
 
 
 def _followed(

@@ -15,7 +15,6 @@ from foretwin.contracts.arrays import Array, Flags, Indices
 from foretwin.geometry.frenet_path import FrenetPath
 from foretwin.sim_worker.metrics import compiled_pairs
 from foretwin.sim_worker.metrics.comfort import comfortable
-from foretwin.sim_worker.metrics.ground import reached
 from foretwin.sim_worker.metrics.lane_areas import LaneAreas
 from foretwin.sim_worker.metrics.progress import keeps_to_road, staying
 from foretwin.sim_worker.metrics.rollout import Measure, RolloutView
@@ -112,7 +111,7 @@ def driving_direction(view: RolloutView) -> Measure:
     if len(far):
         points = centre.reshape(-1, 2)[far]
         route = lanes.route(_path(view))
-        known = reached(lanes.world, points[:, 0], points[:, 1]) & ~lanes.in_junction(points)
+        known = lanes.extent.holds(points) & ~lanes.in_junction(points)
         astray[far] = known & ~lanes.on_route(points, route)
     total = np.cumsum(moved * astray.reshape(moved.shape), axis=1)
     steps = int(ONCOMING_S / _step_s(view) + 1e-9)

@@ -7,6 +7,7 @@ import shapely
 
 from foretwin.contracts.arrays import Array, Flags, Indices
 from foretwin.contracts.world import Area, World
+from foretwin.world_gen.extent import extent_of
 
 TOLERANCE_M = 0.3
 """Beyond the edge this much is no violation: nuPlan, drivable_area_compliance."""
@@ -38,7 +39,7 @@ class DrivableGround:
         size = np.array([east - west, north - south]) + 2.0 * _MARGIN_M
         self._columns, self._rows = np.ceil(size / _CELL_M).astype(int) + 1
         self._cells = np.full(self._columns * self._rows, _UNKNOWN, dtype=np.int8)
-        self.world = world
+        self.extent = extent_of(world)
 
     def contains(self, x_m: Array, y_m: Array) -> Flags:
         """Return (…) whether points (…) in the World's frame lie on drivable ground."""
@@ -68,14 +69,6 @@ class DrivableGround:
             shapely.contains_properly(self.surface, boxes[touched]), _INSIDE, _EDGE
         )
         self._cells[cells] = kind
-
-
-def reached(world: World, x_m: Array, y_m: Array) -> Flags:
-    """Return (…) whether a World reaches as far as points (…) in its frame."""
-    if world.bounds_m is None:
-        return np.asarray(np.hypot(x_m, y_m) <= world.radius_m)
-    west, south, east, north = world.bounds_m
-    return np.asarray((x_m >= west) & (x_m <= east) & (y_m >= south) & (y_m <= north))
 
 
 def paved_areas(world: World) -> list[Area]:

@@ -14,6 +14,7 @@ from foretwin.sim_worker.driver_model import ALONG_COS
 from foretwin.sim_worker.metrics.ground import polygon_of
 from foretwin.sim_worker.metrics.lane_lookup import LaneLookup
 from foretwin.sim_worker.metrics.route_rules import direction_near
+from foretwin.world_gen.extent import extent_of
 
 _EVERY_M = 3.0
 """The path is looked up in the lanes at points so far apart."""
@@ -23,7 +24,7 @@ class LaneAreas:
     """The lanes and connections of a World as strips of their width, and its junctions' areas."""
 
     def __init__(self, world: World) -> None:
-        self.world = world
+        self._world, self.extent = world, extent_of(world)
         self._ways: list[Lane | Connection] = [*world.lanes, *world.connections]
         self._strips = np.array([_strip(way) for way in self._ways], dtype=object)
         self._tree = shapely.STRtree(self._strips)
@@ -35,7 +36,7 @@ class LaneAreas:
     @functools.cached_property
     def lookup(self) -> LaneLookup:
         """The one lane or connection on which each of many points is."""
-        return LaneLookup(self.world)
+        return LaneLookup(self._world)
 
     def in_junction(self, points: Array) -> Flags:
         """Return whether points (K, 2) lie in a junction (K,)."""

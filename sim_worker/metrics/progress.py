@@ -7,7 +7,6 @@ from typing import NamedTuple
 import numpy as np
 
 from foretwin.contracts.arrays import Array, Flags
-from foretwin.sim_worker.metrics.ground import reached
 from foretwin.sim_worker.metrics.rollout import Measure, RolloutView
 
 _LOOK_AGAIN_M = 10.0
@@ -89,5 +88,5 @@ def staying(view: RolloutView) -> Staying:
     left_x, left_y = -view.half_width_m * sin, view.half_width_m * cos
     corners_x = np.stack([x + a * ahead_x + b * left_x for a, b in _CORNERS])
     corners_y = np.stack([y + a * ahead_y + b * left_y for a, b in _CORNERS])
-    known = np.asarray(reached(ground.world, corners_x, corners_y).all(axis=0))
+    known = np.asarray(ground.extent.holds(np.stack([corners_x, corners_y], axis=-1)).all(axis=0))
     return Staying(known, known & ~np.asarray(ground.contains(corners_x, corners_y).all(axis=0)))

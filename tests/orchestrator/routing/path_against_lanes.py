@@ -29,10 +29,10 @@ from foretwin.contracts.world import World
 from foretwin.geometry.polyline import arc_lengths
 from foretwin.orchestrator.config import DriveConfig
 from foretwin.orchestrator.routing.rounding import TIGHT_M, TURN_ROOM_M
-from foretwin.orchestrator.routing.world_lanes import inside
 from foretwin.world_gen.export.picture_ground import draw_ground
 from foretwin.world_gen.export.picture_style import view_around
 from foretwin.world_gen.export.picture_traffic import draw_traffic
+from foretwin.world_gen.extent import extent_of
 from tests.orchestrator.in_process_drive import LockStep, Round
 
 DRIVES = (
@@ -88,7 +88,7 @@ class LanesOfWorld:
                 if not self._dead[found[gaps.argmin()]]:
                     away[number] = gaps.min()
         turning = self._tight.query(path.xy_m)[0] < TURN_ROOM_M
-        return Beside(away, inside(self._world, path.xy_m), turning)
+        return Beside(away, extent_of(self._world).holds(path.xy_m), turning)
 
 
 class Beside(NamedTuple):

@@ -17,10 +17,11 @@ from foretwin.contracts.world import Area
 from foretwin.geometry.frenet_path import FrenetPath
 from foretwin.sim_worker.metrics import comfort
 from foretwin.sim_worker.metrics.evaluation import COMPUTED, computable, evaluate
-from foretwin.sim_worker.metrics.ground import DrivableGround, reached
+from foretwin.sim_worker.metrics.ground import DrivableGround
 from foretwin.sim_worker.metrics.rollout import Context, Rollout
 from foretwin.sim_worker.metrics.route_rules import RouteRules
 from foretwin.sim_worker.metrics.table import METRICS
+from foretwin.world_gen.extent import extent_of
 from foretwin.world_gen.rules.signal_state import HeardCycle
 from tests.sim_worker.metrics.junction import AMBER_S, GREEN_S, STOP_X, context, junction
 from tests.sim_worker.metrics.motions import LENGTH_M, Mover, rollout, times
@@ -141,9 +142,9 @@ def test_beyond_the_worlds_edge_nobody_is_off_the_road() -> None:
 
 def test_a_world_in_a_rectangle_is_known_within_it() -> None:
     world = msgspec.structs.replace(crossroads(), bounds_m=(-20.0, -9.0, 30.0, 9.0))
-    x, y = np.array([[-21.0, 0.0], [29.0, 0.0], [31.0, 0.0], [0.0, -9.5], [0.0, 9.5]]).T
+    xy = np.array([[-21.0, 0.0], [29.0, 0.0], [31.0, 0.0], [0.0, -9.5], [0.0, 9.5]])
 
-    assert reached(world, x, y).tolist() == [False, True, False, False, False]
+    assert extent_of(world).holds(xy).tolist() == [False, True, False, False, False]
 
 
 def test_look_up_says_what_the_polygon_says() -> None:
