@@ -148,8 +148,7 @@ class Dispatch:
         while (one := self._assignment(now_s)) is not None:
             worker = self._workers[one.worker_id]
             self._no_longer_waits(self._open[one.task.key])
-            worker.at_work.append(one.task)
-            worker.world_id = one.task.world_id
+            worker.take(one.task, turn=1 + max(each.turn for each in self._workers.values()))
             given.append(one)
         return given
 
@@ -237,15 +236,16 @@ class Dispatch:
         return known
 
     def _assignment(self, now_s: float) -> Assignment | None:
-        """Return the next task to be given, to the idlest, then fastest worker that may take it."""
+        """Return the next task to be given, to the idlest, then fastest worker that may take it; of
+        equals to the one whose turn is longest ago: none is cold when all are needed."""
         most = self.in_flight if self.waiting >= len(self._workers) else 1
         may_hold = self.sickness.may_hold(self._workers, most, now_s=now_s)
         free = [
-            (len(worker.at_work), self.far.expected_s(worker_id, now_s=now_s), worker_id)
-            for worker_id, worker in self._workers.items()
-            if not worker.silent and len(worker.at_work) < may_hold[worker_id]
+            (len(one.at_work), self.far.expected_s(name, now_s=now_s), one.turn, name)
+            for name, one in self._workers.items()
+            if not one.silent and len(one.at_work) < may_hold[name]
         ]
-        for _, _, worker_id in sorted(free):
+        for *_, worker_id in sorted(free):
             if (task := self._next(worker_id, now_s)) is not None:
                 return Assignment(worker_id, task)
         return None

@@ -15,8 +15,15 @@ class WorkerAtWork:
     at_work: deque[Task] = field(default_factory=deque)
     """In the order in which it answers: it is at the first one."""
     world_id: str = ""
+    turn: int = 0
+    """Grows with each task given: who has the least was given one longest ago."""
     silent: set[str] = field(default_factory=set)
     """Keys of those tasks at work whose questions ended without an answer."""
+
+    def take(self, task: Task, *, turn: int) -> None:
+        """Have one task more, and be at its World from then on."""
+        self.at_work.append(task)
+        self.world_id, self.turn = task.world_id, turn
 
 
 @dataclass(slots=True)

@@ -36,6 +36,16 @@ def test_idle_workers_are_given_the_oldest_tasks() -> None:
     assert given_out(dispatch) == [("w1", "c")]
 
 
+def test_rounds_of_one_task_are_played_in_turn() -> None:
+    dispatch = begun()
+    given = []
+    for key in ("a", "b", "c"):
+        dispatch.submit(task(key))
+        given += given_out(dispatch)
+        dispatch.answered(given[-1][0], key)
+    assert given == [("w0", "a"), ("w1", "b"), ("w0", "c")]
+
+
 def test_a_dead_workers_task_goes_to_another_and_counts_once() -> None:
     dispatch = begun("a", "b")
     given_out(dispatch)
