@@ -20,7 +20,7 @@ from foretwin.contracts.arrays import Array, Indices
 from foretwin.contracts.gap import Culprit, Evidence
 from foretwin.sim_worker.analysis.gap.findings import Finding
 from foretwin.sim_worker.analysis.gap.fitting import JointFit, joint_fit
-from foretwin.sim_worker.analysis.gap.pairs import BLOCK_S, PushBlocks
+from foretwin.sim_worker.analysis.gap.push_blocks import BLOCK_S, PushBlocks
 
 _TOGETHER = 2.0
 """Neighbouring blocks err alike: so many count as one."""

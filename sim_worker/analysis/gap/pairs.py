@@ -7,7 +7,6 @@ another; ratio and offset only turn steering wheels into tyres.
 
 from __future__ import annotations
 
-import math
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -22,15 +21,10 @@ from foretwin.sim_worker.analysis.gap.free_run import (
     tire_angles,
 )
 from foretwin.sim_worker.analysis.gap.measured_motion import MeasuredMotion
+from foretwin.sim_worker.analysis.gap.push_blocks import BLOCK, PushBlocks, push_blocks
 from foretwin.sim_worker.analysis.identify.road_grade import climb_under
 from foretwin.sim_worker.analysis.motion_record import PERIOD_S, MotionRecord
 
-BLOCK = round(0.2 / PERIOD_S)
-BLOCK_S = BLOCK * PERIOD_S
-_LAG = round(0.1 / PERIOD_S)
-"""With which a car follows its command, give or take as much."""
-_NOISE_MPS2, _UNEVEN = 0.15, 0.6
-"""Noise of a block's acceleration, and how much counts what another lag would have asked for."""
 _ALIKE = 2.0
 """Root of how many blocks in a row a map's grade errs alike: it does over some 80 m. Chosen."""
 _RUN, _TAIL = round(1.0 / PERIOD_S), 2 * BLOCK
@@ -40,21 +34,13 @@ _SETTLED = round(0.4 / PERIOD_S)
 _SMOOTH_HALF, _COURSE_HALF, _TURN_HALF = 3, round(0.3 / PERIOD_S), round(0.24 / PERIOD_S)
 MOVES_MPS, _ROLLS_MPS = 2.5, 0.5
 """Above them turning, and acceleration and speed alone, say something."""
+_FULL_LOCK_RAD = 0.36
+"""Sharper, on less than 7 m, tyres scrub and steering runs out of its line: no model is right, and
+what departs there accuses nobody. Chosen: a car of 2.4 m/s at 0.5 rad lost all of 0.6 m/s²."""
 _MOST_ACROSS_MPS2 = 15.0
 """No tyre of the road carries more: from a gyro that says so no model can begin."""
 FASTEST_MPS = 80.0
 """No car's: positions that leap say nothing of its sensors."""
-
-
-class PushBlocks(NamedTuple):
-    """Accelerations (K,) over blocks: commanded, the car's, the model's; speeds, deviations."""
-
-    stamp_ns: Array
-    asked_mps2: Array
-    car_mps2: Array
-    model_mps2: Array
-    speed_mps: Array
-    std_mps2: Array
 
 
 class SignalPairs(NamedTuple):
@@ -127,22 +113,23 @@ def pairs_of(
     asked = record.command_wheel_rad / ratio if wheel else signals.commanded_rad
     done = record.wheel_rad / ratio if wheel else signals.measured_rad
     arc = np.arctan(runner.vehicle.wheelbase_m.value * rate / np.maximum(speed, MOVES_MPS))
+    sharp = np.abs(arc) > _FULL_LOCK_RAD
     sensors: dict[str, Any] = dict.fromkeys(_SENSORS, np.full(len(speed), np.nan))
     if precise_positions:
         sensors = _sensors(record, antenna_ahead_m)
     return SignalPairs(
         stamp_ns=record.stamp_ns,
         moves=moves,
-        excited=moves & (turn > MIN_TURN_RAD),
+        excited=moves & (turn > MIN_TURN_RAD) & ~sharp,
         asked_rad=np.where(moves, asked, np.nan),
         done_rad=np.where(moves, done, np.nan),
         arc_rad=np.where(moves, arc, np.nan),
         speed_mps=speed,
-        curvature_pm=np.where(moves, rate / np.maximum(speed, MOVES_MPS), np.nan),
+        curvature_pm=np.where(moves & ~sharp, rate / np.maximum(speed, MOVES_MPS), np.nan),
         commanded_rad=signals.commanded_rad,
         too_fast=outrun(asked, done, fastest_radps=runner.vehicle.max_tire_rate_radps.value),
         **sensors,
-        **_runs(record, runner, memory or RunMemory()),
+        **_runs(record, runner, memory or RunMemory(), sharp),
     )
 
 
@@ -187,8 +174,11 @@ def _sensors(record: MotionRecord, ahead_m: float) -> dict[str, Any]:
     return dict(zip(_SENSORS, found, strict=True))
 
 
-def _runs(record: MotionRecord, runner: FreeRunner, memory: RunMemory) -> dict[str, Any]:
-    """Return the model's curvature by measured steering and by command, its tyres, and pushes.
+def _runs(
+    record: MotionRecord, runner: FreeRunner, memory: RunMemory, sharp: Flags
+) -> dict[str, Any]:
+    """Return the model's curvature by measured steering and by command, its tyres, and pushes but
+    where the car turns at full lock.
 
     Runs overlap so that their ends tile the stretch, back from its own end.
     """
@@ -260,39 +250,6 @@ def _runs(record: MotionRecord, runner: FreeRunner, memory: RunMemory) -> dict[s
     by_command[at[commanded][:, None] + tail] = curvature[commanded]
     tire[at[commanded][:, None] + tail] = states[commanded][:, tail, 6]
     doubt = 0.0 if climb is None else _ALIKE * climb.std_mps2
-    pushes = push_blocks(record, eased, told_starts, states[~held][:, :, 3], doubt_mps2=doubt)
+    told_of = np.where(sharp, np.nan, eased)
+    pushes = push_blocks(record, told_of, told_starts, states[~held][:, :, 3], doubt_mps2=doubt)
     return {**found, "pushes": pushes}
-
-
-def push_blocks(
-    record: MotionRecord,
-    speed_mps: Array,
-    starts: Indices,
-    model_mps: Array,
-    *,
-    doubt_mps2: float = 0.0,
-) -> PushBlocks:
-    """Return the last two blocks of each run at grid indices `starts` (K,).
-
-    `doubt_mps2` is how far what slopes take is off.
-    `speed_mps` (N,) is the car's on the grid, `model_mps` (K, steps + 1) the model's of each run.
-    """
-    asked = record.command_accel_mps2
-    rows = []
-    for start, model in zip(starts, model_mps, strict=True):
-        for end in (len(model) - 1 - BLOCK, len(model) - 1):
-            at = int(start) + end
-            soon, due, late = (
-                np.mean(asked[at - BLOCK - k * _LAG : at - k * _LAG]) for k in range(3)
-            )
-            rows.append(
-                (
-                    record.stamp_ns[at],
-                    due,
-                    (speed_mps[at] - speed_mps[at - BLOCK]) / BLOCK_S,
-                    (model[end] - model[end - BLOCK]) / BLOCK_S,
-                    speed_mps[at - BLOCK // 2],
-                    math.hypot(_NOISE_MPS2, _UNEVEN * float(soon - late), doubt_mps2),
-                )
-            )
-    return PushBlocks(*np.array(rows, dtype=np.float64).reshape(len(rows), 6).T)

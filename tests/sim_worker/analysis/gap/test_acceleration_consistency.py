@@ -8,13 +8,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from foretwin.contracts.arrays import Array
-from foretwin.sim_worker.analysis.gap.acceleration_consistency import (
-    PushBlocks,
-    PushTest,
-    _finding,
-)
+from foretwin.sim_worker.analysis.gap.acceleration_consistency import PushTest, _finding
 from foretwin.sim_worker.analysis.gap.consistency import change_index
 from foretwin.sim_worker.analysis.gap.findings import Finding
+from foretwin.sim_worker.analysis.gap.push_blocks import PushBlocks
 
 BLOCK_NS = 200_000_000
 

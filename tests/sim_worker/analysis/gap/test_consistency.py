@@ -8,14 +8,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from foretwin.contracts.arrays import Array
-from foretwin.sim_worker.analysis.gap.acceleration_consistency import PushBlocks
 from foretwin.sim_worker.analysis.gap.consistency import consistency_of
 from foretwin.sim_worker.analysis.gap.findings import Finding, findings_of
 from foretwin.sim_worker.analysis.gap.free_run import outrun
 from foretwin.sim_worker.analysis.gap.pairs import SignalPairs
+from foretwin.sim_worker.analysis.gap.push_blocks import PushBlocks
 from foretwin.sim_worker.analysis.motion_record import PERIOD_S
-
-COVERS = ("foretwin.sim_worker.analysis.gap.pairs",)
 
 TIME_S = np.arange(301) * PERIOD_S
 TYRES_RAD = 0.12 * np.sin(1.3 * TIME_S)
