@@ -123,10 +123,16 @@ def _lasts(values: Array) -> int:
 
 
 class Lateness(NamedTuple):
-    """A column is stamped `late_s` later than positions, with a standard deviation."""
+    """A column is stamped `late_s` later than positions, with a standard deviation: infinite where
+    nothing tells it, and where it is as late, or early, as is tried, or more."""
 
     late_s: float
     std_s: float
+
+    @property
+    def beyond(self) -> bool:
+        """Whether it is as late as is tried, or more."""
+        return abs(self.late_s) > _LATEST_S - GRID_S
 
     @property
     def sure(self) -> bool:
@@ -165,6 +171,8 @@ def lateness(
             return None
         found.append((fit.shift_std_s, fit.shift_s))
     std_s, late_s = min(found)
+    if Lateness(late_s, std_s).beyond:
+        return Lateness(late_s, math.inf)
     apart_s = max(abs(late_s - other) for _, other in found)
     doubts_s = [std_s, 0.5 * apart_s, GRID_S / np.sqrt(12.0)]
     if lever is not None:

@@ -144,7 +144,12 @@ class Sections:
         if told is not None:
             more = {"new_when": told.columns, "again_s": told.again_s}
             said.append(told.evidence)
-        if late is None or not math.isfinite(late.std_s):
+        if late is not None and late.beyond:
+            said.append(
+                f"late against positions by {late.late_s:+z.1f} s or more, which is as much as is "
+                "tried: not corrected (late_s does it)"
+            )
+        elif late is None or not math.isfinite(late.std_s):
             said.append("lateness against positions: not observable")
         else:
             said.append(

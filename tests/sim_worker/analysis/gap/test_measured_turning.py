@@ -85,3 +85,9 @@ def test_samples_are_put_on_one_clock_where_it_is_told_well_enough() -> None:
 
 def test_half_a_minute_is_needed() -> None:
     assert turning_of(hand_driven(SEED, Lateness(), end_s=25.0)) is None
+
+
+def test_a_sensor_later_than_is_tried_is_not_told_to_be_as_late_as_that() -> None:
+    found = turning_of(hand_driven(SEED, Lateness(speed_s=1.6)))
+    assert found is None or found.speed_clock is None
+    assert turning_of(hand_driven(SEED, Lateness(steering_s=1.6))) is None

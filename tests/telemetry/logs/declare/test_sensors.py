@@ -67,3 +67,18 @@ def test_a_commanded_acceleration_does_not_hide_the_measured_one(tmp_path: Path)
     alone = propose(one_table(tmp_path, r=rate, control_accel=now_and_then))
     said = "acceleration (control_accel) and turning rate (r) stand in different rows"
     assert said in "\n".join(alone.unknown)
+
+
+@pytest.mark.parametrize(("late_s", "corrected"), [(0.4, True), (1.6, False)])
+def test_a_lateness_beyond_what_is_tried_is_told_as_that_and_not_corrected(
+    tmp_path: Path, late_s: float, corrected: bool
+) -> None:
+    drive = drawn_drive()
+    fixes, speed = drive["gnss"].stamps_ns, drive["speed"]
+    late = np.interp(fixes - late_s * 1e9, speed.stamps_ns, speed.columns["forward"])
+    proposed = propose(one_table(tmp_path, v=late))
+    assert proposed.declaration is not None
+    assert proposed.declaration.speed is not None
+    assert (proposed.declaration.speed.late_s > 0.3) == corrected
+    said = "\n".join(str(line) for line in proposed.evidence["speed"])
+    assert ("s or more" in said) != corrected
