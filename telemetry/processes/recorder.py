@@ -11,6 +11,7 @@ import os
 import threading
 import time
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -32,7 +33,8 @@ _WAIT_S = 0.1
 _GATHER_S = 0.05
 """Messages are taken in portions: waking up for each of them costs more than writing it."""
 _NICENESS = 10
-_AT_ONCE = 500
+_AT_ONCE, _BEHIND = 500, 1000
+"""A portion; and so many waiting are seconds of a car: who is so far behind hurries."""
 _FLUSH_EVERY_S = 1.0
 _ASK_EVERY_S = 1.0
 _LAST_WORDS_S, _BACKLOG_S = 0.5, 4.0
@@ -82,10 +84,18 @@ class RecorderProcess:
         life.ready()
 
     def run(self) -> None:
-        """Record until the run is over."""
-        while self.step():
-            if not self._lossless:
-                time.sleep(_GATHER_S)
+        """Record until the run is over, giving way while little waits.
+
+        Not the bus's threads: a message that they do not fetch in time is lost. Nor this one, which
+        writes itself where much waits: on a machine that others keep busy all of it would be lost.
+        """
+        with ThreadPoolExecutor(1, initializer=_give_way) as calm:
+            goes_on = True
+            while goes_on:
+                behind = len(self._messages) > _BEHIND
+                goes_on = self.step() if behind else calm.submit(self.step).result()
+                if not (self._lossless or behind):
+                    time.sleep(_GATHER_S)
         self.finish()
 
     def step(self) -> bool:
@@ -192,7 +202,8 @@ class RecorderProcess:
             self._reported_lost = lost
             text = (
                 f"{lost} messages are missing in the recording so far"
-                f" ({self._messages.dropped} dropped since the disk is slow, the rest by the bus)"
+                f" ({self._messages.dropped} dropped since disk or processor is slow, the rest by"
+                " the bus)"
             )
             log.warning(text)
             event = Event(stamp_ns=self._stamp_ns, level="warning", source=SOURCE, text=text)
@@ -214,15 +225,11 @@ def serve(setup: RecorderSetup, bus: Bus, life: ProcessLife) -> None:
         vehicle_id=setup.vehicle_id,
         lossless=setup.bus.lossless,
     )
-    _give_way()
     process.run()
 
 
 def _give_way() -> None:
-    """Let this thread, which writes for later, give way to who is waited for.
-
-    Not the bus's threads: a message that they do not fetch in time is lost.
-    """
+    """Let this thread, which writes for later, give way to who is waited for."""
     with contextlib.suppress(OSError):
         os.setpriority(os.PRIO_PROCESS, threading.get_native_id(), _NICENESS)
 
