@@ -35,6 +35,8 @@ from foretwin.telemetry.estimator.shallow_copy import shallow_copy
 
 _COURSE_STD_RAD, _SPEED_STD_MPS = 0.15, 1.0
 """At the least, of a course between fixes and of a speed: a car turns and pulls away. Chosen."""
+_CREEPS_MPS, _ELSEWHERE_M = 0.5, 20.0
+"""Who was slower as it fell silent stood: it heads as before, unless it is heard of farther off."""
 _MOST_FASTER_MPS = 5.0
 """A second and a half of a car's hardest pulling away (0.35 g)."""
 
@@ -77,8 +79,7 @@ class MotionTrack:
         other._corrections = self._corrections.copy(other._measured, other._surprises)
         other._positions = self._positions.copy(other._measured, other._gate, other._surprises)
         other._aid = shallow_copy(self._aid)
-        if self._filter is not None:
-            other._filter = self._filter.copy()
+        other._filter = None if self._filter is None else self._filter.copy()
         return other
 
     def take(self, channel: str, message: Any) -> bool:
@@ -139,19 +140,20 @@ class MotionTrack:
         if self._gate.frozen(time_s, xy, speed_mps=speed_mps):
             self.skipped["gnss_repeated"] += 1  # a receiver's last answer, sent once more
             return False
-        expected = self._gate.recent[-1].xy_m if self._gate.recent else None
+        expected, lost = self._gate.recent[-1].xy_m if self._gate.recent else None, False
         if filter_ is not None:
             expected = filter_.sensor_xy(self._lever[:2])
             late_ns = self._filter_stamp_ns - fix.stamp_ns
             if late_ns > 0:
                 xy = xy + filter_.way_m(late_ns * 1e-9)
+            lost = filter_.is_lost and math.dist(xy, expected) > _ELSEWHERE_M
         verdict = self._gate.judge(time_s, xy, expected)
         if verdict == "skip":
             return False
-        if verdict == "relocate" and not self._place.reaches(xy):
+        if lost or (verdict == "relocate" and not self._place.reaches(xy)):
             # What went before was wrong, or another place: begin anew, with a frame of this one.
-            self._place = LocalPlace.around(fix.position)
-            self._gate.restart(time_s, np.zeros(2))
+            self._place, xy = LocalPlace.around(fix.position), np.zeros(2)
+            self._gate.restart(time_s, xy)
             filter_ = self._filter = None
         self._fix = fix
         self._place = self._place.at(fix.position, antenna_up_m=self._lever[2])
@@ -227,6 +229,10 @@ class MotionTrack:
     def _advance(self, stamp_ns: int) -> KinematicFilter | None:
         if self._filter is not None and stamp_ns > self._filter_stamp_ns:
             silent_ns = stamp_ns - self._filter_stamp_ns
+            if silent_ns > CLOCK_LEAP_NS and abs(self._filter.mean.item(SPEED)) > _CREEPS_MPS:
+                self._filter, self._standing = None, False  # it heads anywhere by now
+                self._gate.recent.clear()
+                return None
             # After a long silence the motion is unknown: two seconds of it are enough.
             self._filter.predict(min(silent_ns * 1e-9, 2.0))
             if silent_ns > CLOCK_LEAP_NS:

@@ -186,3 +186,41 @@ def test_after_a_hole_the_car_is_where_the_next_fixes_say() -> None:
     assert len(after) >= 7
     for state in after:
         assert xy(state) == pytest.approx((1700.0, 300.0), abs=3.0)
+
+
+def around_a_hole(
+    *, before_mps: float, after_mps: float, resumes_m: tuple[float, float]
+) -> list[Sample]:
+    """East at 16 m/s, from 10 s on at another speed, a minute of nothing, and then north."""
+    samples: list[Sample] = []
+    for tick in range(64):
+        time_s = 0.5 * tick + (0.0 if tick < 40 else 60.0)
+        speed_mps = 16.0 if time_s < 10.0 else before_mps if tick < 40 else after_mps
+        place = 16.0 * min(time_s, 10.0) + before_mps * max(time_s - 10.0, 0.0), 0.0
+        if tick >= 40:
+            place = resumes_m[0], resumes_m[1] + after_mps * (time_s - 80.0)
+        samples.append(("speed", SpeedSample(stamp_ns=round(time_s * 1e9), speed_mps=speed_mps)))
+        samples.append(fix(time_s, *place, 0.8))
+    return samples
+
+
+@pytest.mark.parametrize("before_mps", [16.0, 0.0])
+def test_after_a_hole_a_car_heads_as_it_is_seen_to_and_not_as_before(before_mps: float) -> None:
+    """It was known to head east within 15°, and its place led that way, up to 24 m off."""
+    drive = around_a_hole(before_mps=before_mps, after_mps=16.0, resumes_m=(900.0, 300.0))
+    states = states_of(drive)
+    after = [state for state in states if state.stamp_ns > 80e9]
+    assert not after[0].yaw_valid
+    assert after[2].yaw_valid
+    for state in after:
+        assert xy(state)[0] == pytest.approx(900.0, abs=3.0)
+        assert not state.yaw_valid or yaw(state) == pytest.approx(0.5 * math.pi, abs=0.1)
+
+
+def test_who_stood_before_a_hole_and_is_where_it_was_heads_as_before() -> None:
+    parked = around_a_hole(before_mps=0.0, after_mps=0.0, resumes_m=(161.0, 0.0))
+    after = [state for state in states_of(parked) if state.stamp_ns > 80e9]
+    assert len(after) > 20
+    for state in after:
+        assert state.yaw_valid
+        assert yaw(state) == pytest.approx(0.0, abs=0.1)
