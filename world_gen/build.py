@@ -39,7 +39,7 @@ from foretwin.world_gen.rules.junction_rules import junction_rules
 if TYPE_CHECKING:
     from foretwin.world_gen.driven.correction import Driven
 
-GENERATOR_VERSION = 32
+GENERATOR_VERSION = 33
 """Counts changes of what is built from the same map; part of every cache key."""
 DEFAULT_RADIUS_M = 150.0
 

@@ -13,6 +13,7 @@ from tests.world_gen.drawn_maps import STREET, crossing, drawn_map, world_of
 COVERS = (
     "foretwin.world_gen.lanes.lane_curves",
     "foretwin.world_gen.lanes.reference_lines",
+    "foretwin.world_gen.lanes.tapers",
     "foretwin.world_gen.lanes.transitions",
 )
 
@@ -126,8 +127,26 @@ def test_a_lane_more_begins_behind_a_taper_seven_times_as_long_as_it_is_wide(
     assert at[0] - start[0] == pytest.approx(before_m, abs=0.1)
     assert end[0] - at[0] == pytest.approx(behind_m, abs=0.1)
     if before_m + behind_m > 22.0:
-        steps = np.diff(widest.centerline, axis=0)
-        assert np.abs(np.arctan2(steps[:, 1], steps[:, 0])).max() < math.radians(16.0)
+        assert _turned_rad(widest.centerline) < math.radians(16.0)
+
+
+def test_a_lane_more_takes_more_of_short_roads_than_to_be_steeper_than_one_in_four():
+    """20 and 8 m gave 8.4 m for it: cars turned by 36° for a lane beside theirs."""
+    one_way = ONE_WAY | {"placement": "right_of:1"}
+    nodes = {0: (0.0, 0.0), 5: (60.0, 0.0), 1: (80.0, 0.0), 2: (88.0, 0.0)}
+    nodes |= {3: (-90.0, 0.0), 4: (0.0, -90.0)}
+    ways = [(11, [0, 5], one_way), (15, [5, 1], one_way | {"maxspeed": "30"})]
+    ways += [(12, [1, 2], one_way | {"lanes": "3"}), (13, [3, 0], WIDE), (14, [4, 0], STREET)]
+    paths = [c for c in world_of(drawn_map(nodes, ways)).connections if c.place_id == "1"]
+    widest = max(paths, key=lambda c: abs(c.centerline[-1, 1] - c.centerline[0, 1]))
+    assert widest.centerline[0, 0] == pytest.approx(80.0 - 8.2, abs=0.1)
+    assert widest.centerline[-1, 0] == pytest.approx(80.0 + 4.8, abs=0.1)
+    assert _turned_rad(widest.centerline) < math.radians(26.0)
+
+
+def _turned_rad(centerline: np.ndarray) -> float:
+    steps = np.diff(centerline, axis=0)
+    return float(np.abs(np.arctan2(steps[:, 1], steps[:, 0])).max())
 
 
 def test_a_lane_that_ends_does_so_over_as_long_a_taper():

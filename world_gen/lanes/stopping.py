@@ -7,6 +7,7 @@ from collections.abc import Iterable, Mapping
 
 from foretwin.geometry.polyline import arc_lengths
 from foretwin.world_gen.lanes.cluster import Cluster
+from foretwin.world_gen.lanes.lane_plans import CrossSection
 from foretwin.world_gen.roads.road_graph import DirectedEdge
 from foretwin.world_gen.roads.road_tags import is_crossed
 
@@ -50,6 +51,17 @@ def stop_line_m(leg: DirectedEdge, cluster: Cluster, node_tags: NodeTags) -> flo
             signs.append(at_m)
     line_m: float = min(max(lights or crossings, default=math.inf), *signs, math.inf)
     return line_m - LINE_SETBACK_M
+
+
+def must_reach_m(
+    leg: DirectedEdge,
+    cluster: Cluster,
+    sections: Mapping[int, CrossSection],
+    node_tags: NodeTags,
+) -> float:
+    """Return how far along a leg lanes must reach; nowhere where all of them lead outward."""
+    driven_in = sections[leg.edge.index].along(reverse=not leg.reverse).abreast
+    return stop_line_m(leg, cluster, node_tags) if driven_in else math.inf
 
 
 def before_crossings_m(leg: DirectedEdge, node_tags: NodeTags) -> float:

@@ -13,32 +13,33 @@ from foretwin.geometry.polyline_batch import Polylines, cut, without_repeats
 from foretwin.world_gen.lanes.cluster import Cluster
 from foretwin.world_gen.lanes.fork_trims import fork_trims
 from foretwin.world_gen.lanes.lane_plans import CrossSection
-from foretwin.world_gen.lanes.legs import Heads, is_ring_edge, lateral_positions
-from foretwin.world_gen.lanes.stopping import NodeTags, before_crossings_m, stop_line_m
+from foretwin.world_gen.lanes.legs import Heads, is_ring_edge
+from foretwin.world_gen.lanes.stopping import NodeTags, must_reach_m
+from foretwin.world_gen.lanes.tapers import (
+    MAX_TRIM_M,
+    MOST_WANTED,
+    TAPER_SHARE,
+    lane_positions,
+    tapers_m,
+)
 from foretwin.world_gen.lanes.turning_room import turning_trims
 from foretwin.world_gen.roads.headings import dot, heading_out
-from foretwin.world_gen.roads.road_graph import DirectedEdge, EdgeKey, RoadEdge
+from foretwin.world_gen.roads.road_graph import EdgeKey, RoadEdge
 
 CORNER_M = 3.5
 """Room between the kerb of the other road and a lane's end."""
 RING_CORNER_M = 1.5
-MAX_TRIM_M, _LEG_LOOK_M = 30.0, 45.0
+_LEG_LOOK_M = 45.0
 _OWN_START_M = 15.0
 """What overlaps a leg farther out belongs to another place, unless it goes on from here."""
 TAPER_M = 6.0
 """Lanes end so far before, and begin so far behind, a place where their number changes."""
 SAME_PLACE_M = 0.01
 """Lanes whose middles part less run on into each other: it is what widths add up to."""
-TAPER_PER_SHIFT = 7.0
-"""So many times as long as lanes shift to the side is what lies between their ends, where roads
-have room for it: paths then turn from their lanes by 15°, a smoothest shift by 15/8 of its mean
-slope (Flash and Hogan 1985)."""
 SHARPEST_BEND_COS = math.cos(math.radians(75.0))
 """Lanes run on through bends; sharper ones are driven as turns."""
-TAPER_SHARE = 0.3
-"""Of an edge, that one taper may take."""
-MOST_CUT, MOST_WANTED = 0.8, 0.6
-"""Shares of an edge that its two ends may take: to clear other roads, and for turns to be wider."""
+MOST_CUT = 0.8
+"""Share of an edge that its two ends may take to clear other roads."""
 
 
 def trims(
@@ -56,7 +57,7 @@ def trims(
     """
     least: dict[EdgeKey, float] = {}
     wanted: dict[EdgeKey, float] = {}
-    tapers_m: dict[EdgeKey, float] = {}
+    tapers: dict[EdgeKey, float] = {}
     by_size: dict[int, list[tuple[Cluster, Array]]] = {}
     wide = [cluster for cluster in clusters if len(cluster.nodes) > 1]
     areas = dict(zip([c.key for c in wide], _area_trims(wide, edges, sections), strict=True))
@@ -65,7 +66,7 @@ def trims(
         if cluster.plain:
             values = _plain_trims(cluster, sections, shifts_m, heads)
             if values is not None:
-                tapers_m |= _tapers_m(cluster, sections, shifts_m, node_tags)
+                tapers |= tapers_m(cluster, sections, shifts_m, node_tags)
         else:
             values = areas[cluster.key] if len(cluster.nodes) > 1 else nodes[cluster.key]
         driven = np.array([driven_m.get(leg.key, 0.0) for leg in cluster.legs])
@@ -76,7 +77,7 @@ def trims(
         mine = [cluster for cluster, _ in alike]
         legs = [leg for cluster in mine for leg in cluster.legs]
         cleared = np.minimum([values for _, values in alike], MAX_TRIM_M)
-        lines = [_stop_m(leg, cl, sections, node_tags) for cl in mine for leg in cl.legs]
+        lines = [must_reach_m(leg, cl, sections, node_tags) for cl in mine for leg in cl.legs]
         most = np.minimum(np.reshape(lines, cleared.shape), MAX_TRIM_M)
         turning = turning_trims(mine, sections, cleared, most)
         keys = [leg.key for leg in legs]
@@ -85,24 +86,13 @@ def trims(
     for cluster in clusters:
         for leg in cluster.legs:
             wanted.setdefault(leg.key, 0.0)
-    for key, metres in tapers_m.items():
+    for key, metres in tapers.items():
         wanted[key] = max(wanted[key], metres)
     for key, metres in fork_trims(clusters, sections, heads).items():
         least[key] = max(least.get(key, 0.0), metres)
         wanted[key] = max(wanted[key], metres)
     _share(least, wanted, edges)
     return wanted
-
-
-def _stop_m(
-    leg: DirectedEdge,
-    cluster: Cluster,
-    sections: Mapping[int, CrossSection],
-    node_tags: NodeTags,
-) -> float:
-    """Return how far along a leg lanes must reach; nowhere where all of them lead outward."""
-    driven_in = sections[leg.edge.index].along(reverse=not leg.reverse).abreast
-    return stop_line_m(leg, cluster, node_tags) if driven_in else math.inf
 
 
 def _share(
@@ -133,75 +123,13 @@ def _plain_trims(
     heads: Heads,
 ) -> Array | None:
     """Lanes of one road run on where they fit (None); where lanes change there is a taper."""
-    before, behind = _positions(cluster, sections, shifts_m)
+    before, behind = lane_positions(cluster, sections, shifts_m)
     fits = len(before) == len(behind) and np.allclose(before, behind, rtol=0.0, atol=SAME_PLACE_M)
     fits = fits and cluster.keeps_widths(sections)
     if fits and -dot(*(heads[leg.key] for leg in cluster.legs)) > SHARPEST_BEND_COS:
         return None
     room = (0.0 if fits else min(TAPER_M, TAPER_SHARE * leg.edge.length_m) for leg in cluster.legs)
     return np.array(list(room))
-
-
-def _positions(
-    cluster: Cluster,
-    sections: Mapping[int, CrossSection],
-    shifts_m: Mapping[int, tuple[float, float]],
-) -> tuple[list[tuple[float, bool]], list[tuple[float, bool]]]:
-    """Return where lanes lie before and behind a place where one road goes on, seen along it."""
-    before, behind = (
-        lateral_positions(
-            leg,
-            sections[leg.edge.index],
-            outward=outward,
-            shift_m=shifts_m.get(leg.edge.index, (0.0, 0.0))[int(leg.reverse)],
-        )
-        for leg, outward in zip(cluster.legs, (False, True), strict=True)
-    )
-    return before, behind
-
-
-def _tapers_m(
-    cluster: Cluster,
-    sections: Mapping[int, CrossSection],
-    shifts_m: Mapping[int, tuple[float, float]],
-    node_tags: NodeTags,
-) -> dict[EdgeKey, float]:
-    """Return what the lanes of both legs give way, by leg, so that none has to swerve.
-
-    What one leg has no room for the other one gives.
-    """
-    before, behind = _positions(cluster, sections, shifts_m)
-    length_m = TAPER_PER_SHIFT * max(
-        _farthest_m(
-            np.array([at_m for at_m, along in before if along == driven]),
-            np.array([at_m for at_m, along in behind if along == driven]),
-        )
-        for driven in (False, True)
-    )
-    rooms_m = [
-        min(
-            TAPER_SHARE * leg.edge.length_m,
-            _stop_m(leg, cluster, sections, node_tags),
-            before_crossings_m(leg, node_tags),
-            MAX_TRIM_M,
-        )
-        for leg in cluster.legs
-    ]
-    each_m = [min(length_m / 2.0, room_m) for room_m in rooms_m]
-    return {
-        leg.key: min(length_m - other_m, room_m)
-        for leg, room_m, other_m in zip(cluster.legs, rooms_m, each_m[::-1], strict=True)
-    }
-
-
-def _farthest_m(before: Array, behind: Array) -> float:
-    """Return how far lanes, from the right, lie aside of those that they pass into."""
-    if not (len(before) and len(behind)):
-        return 0.0
-    if len(before) == len(behind):
-        return float(np.abs(before - behind).max())
-    gaps = np.abs(before[:, None] - behind)
-    return float(max(gaps.min(axis=0).max(), gaps.min(axis=1).max()))
 
 
 def _node_trims(

@@ -22,7 +22,7 @@ from foretwin.world_gen.lanes.stopping import (
     clear_of_crossings,
     faces,
 )
-from foretwin.world_gen.lanes.trims import MAX_TRIM_M
+from foretwin.world_gen.lanes.tapers import MAX_TRIM_M
 from foretwin.world_gen.roads.road_tags import is_crossed
 from foretwin.world_gen.rules.control_devices import is_light
 from foretwin.world_gen.rules.signal_heads import (
