@@ -6,8 +6,6 @@ import os
 import signal
 import subprocess
 import sys
-import threading
-import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -18,11 +16,8 @@ from foretwin.contracts.bus import Mailbox, Received, ZenohBus
 from foretwin.contracts.codec import encode
 from foretwin.contracts.drive import DriveEnd, SpeedSample
 from foretwin.contracts.keys import key as channel_key
-from foretwin.contracts.process import ProcessLife
-from foretwin.contracts.setup import BusSetup, ProcessSetup
 from foretwin.contracts.simulation import RunEnd
 from foretwin.telemetry.logs import open_log
-from foretwin.telemetry.processes.recorder import RecorderProcess
 from foretwin.telemetry.processes.recording import DriveRecording
 from tests.contracts.bus_sides import DEADLINE_S
 from tests.contracts.memory_bus import MemoryBus
@@ -31,40 +26,7 @@ from tests.telemetry.drive_messages import INFO, START_NS, every_channel
 from tests.telemetry.own_recordings import read_drive
 from tests.telemetry.processes.recorder_process import ORCHESTRATOR, recorder_process
 from tests.telemetry.processes.small_disk import Disk
-
-
-class Wall:
-    """A clock that is moved by hand."""
-
-    def __init__(self) -> None:
-        self.now_s, self.each_look_s = 0.0, 0.0
-
-    def __call__(self) -> float:
-        self.now_s += self.each_look_s
-        return self.now_s
-
-
-SETUP = ProcessSetup(
-    run_id="r1", process_id="recorder", vehicle_id="car", bus=BusSetup(endpoint=""), log_file=""
-)
-
-
-def recorder(
-    bus: MemoryBus,
-    recording: DriveRecording,
-    *,
-    lossless: bool = True,
-    mono_s: Any = time.monotonic,
-) -> RecorderProcess:
-    return RecorderProcess(
-        recording,
-        bus=bus,
-        life=ProcessLife(SETUP, bus, mono_s=mono_s),
-        run_id="r1",
-        vehicle_id="car",
-        lossless=lossless,
-        mono_s=mono_s,
-    )
+from tests.telemetry.processes.wired_recorder import SETUP, Wall, recorder
 
 
 def publish_all(bus: MemoryBus | ZenohBus) -> None:
@@ -89,42 +51,6 @@ def test_what_is_missing_is_asked_for_once_more(tmp_path: Path) -> None:
     assert process.step()
     assert set(bus.recovered[1:]) == {channel_key(one, vehicle="car") for one in ("speed", "imu")}
     process.finish()
-
-
-def test_who_is_behind_at_the_end_writes_what_has_come_by_then(tmp_path: Path) -> None:
-    wall, bus, recording = Wall(), MemoryBus(), DriveRecording(tmp_path / "drive.mcap")
-    process = recorder(bus, recording, lossless=False, mono_s=wall)
-    for number in range(1200):
-        bus.publish("speed", SpeedSample(stamp_ns=START_NS + number, speed_mps=1.0), vehicle="car")
-    wall.each_look_s = 0.3
-    process.finish()
-    assert recording.tally.recorded == {"speed": 1200}
-
-
-def test_who_is_far_behind_gives_way_no_more(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    bus, recording = MemoryBus(), DriveRecording(tmp_path / "drive.mcap")
-    process = recorder(bus, recording, lossless=False)
-    wrote, add = [], recording.add
-
-    def written(*message: Any, **numbered: Any) -> Any:
-        wrote.append(
-            (threading.get_ident(), os.getpriority(os.PRIO_PROCESS, threading.get_native_id()))
-        )
-        if len(wrote) == 1700:
-            bus.publish("run_end", RunEnd(stamp_ns=START_NS), run="r1")
-        return add(*message, **numbered)
-
-    monkeypatch.setattr(recording, "add", written)
-    for number in range(1700):
-        bus.publish("speed", SpeedSample(stamp_ns=START_NS + number, speed_mps=1.0), vehicle="car")
-    process.run()
-
-    hurries = threading.get_ident()
-    assert [one == hurries for one, _ in wrote] == [True] * 1002 + [False] * 698
-    assert wrote[-1][1] >= max(wrote[0][1], 10)
-    assert recording.tally.recorded == {"speed": 1700}
 
 
 @pytest.mark.parametrize(("run_ended", "lossless"), [(True, False), (False, False), (False, True)])
