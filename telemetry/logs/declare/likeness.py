@@ -124,7 +124,7 @@ def _lasts(values: Array) -> int:
 
 class Lateness(NamedTuple):
     """A column is stamped `late_s` later than positions, with a standard deviation: infinite where
-    nothing tells it, and where it is as late, or early, as is tried, or more."""
+    nothing tells it."""
 
     late_s: float
     std_s: float
@@ -171,8 +171,6 @@ def lateness(
             return None
         found.append((fit.shift_std_s, fit.shift_s))
     std_s, late_s = min(found)
-    if Lateness(late_s, std_s).beyond:
-        return Lateness(late_s, math.inf)
     apart_s = max(abs(late_s - other) for _, other in found)
     doubts_s = [std_s, 0.5 * apart_s, GRID_S / np.sqrt(12.0)]
     if lever is not None:

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from foretwin.contracts.drive import SpeedSample
+from foretwin.contracts.drive import HeadingSample, SpeedSample
 from foretwin.telemetry.estimator.estimator import StateEstimator
 from foretwin.telemetry.estimator.filter_state import GNSS_X, X
 from foretwin.telemetry.estimator.innovations import SurpriseCount
@@ -224,3 +224,18 @@ def test_who_stood_before_a_hole_and_is_where_it_was_heads_as_before() -> None:
     for state in after:
         assert state.yaw_valid
         assert yaw(state) == pytest.approx(0.0, abs=0.1)
+
+
+def test_a_heading_heard_first_after_a_hole_begins_no_motion_where_the_car_was() -> None:
+    samples: list[Sample] = []
+    for channel, message in around_a_hole(
+        before_mps=16.0, after_mps=16.0, resumes_m=(900.0, 300.0)
+    ):
+        if channel == "speed":
+            north = 0.5 * math.pi if message.stamp_ns > 70e9 else 0.0
+            samples.append(("heading", HeadingSample(stamp_ns=message.stamp_ns, yaw_rad=north)))
+        samples.append((channel, message))
+    after = [state for state in states_of(samples) if state.stamp_ns > 70e9]
+    assert len(after) > 20
+    for state in after:
+        assert xy(state)[0] == pytest.approx(900.0, abs=3.0)
