@@ -38,7 +38,8 @@ from foretwin.telemetry.estimator.shallow_copy import shallow_copy
 _MAX_STEP_S = 0.05
 _HARDEST_MPS2 = 10.0
 """No car on tyres turns harder (1 g)."""
-_STANDING_CURVATURE_PM, _UNKNOWN_PLACE_M, _LOST_M = 0.1, 1000.0, 200.0
+_STANDING_CURVATURE_PM = 0.1
+_UNKNOWN_PLACE_M = 1000.0
 
 
 class KinematicFilter:
@@ -86,11 +87,6 @@ class KinematicFilter:
         """
         speed = self.mean.item(SPEED)
         return abs(speed) <= MOST_SPEED_MPS and bool(compiled.spreads_are_any(self.covariance))
-
-    @property
-    def is_lost(self) -> bool:
-        """Whether the place is unknown: within no more than streets."""
-        return self.covariance.item(X, X) > _LOST_M * _LOST_M
 
     @property
     def yaw_rate_radps(self) -> float:

@@ -63,7 +63,7 @@ class MotionTrack:
         self._filter: KinematicFilter | None = None
         self._start_ns = self._filter_stamp_ns = 0
         self._fix: GnssFix | None = None
-        self._standing = False
+        self._standing = self._unheard = False
 
     @property
     def skipped(self) -> Counter[str]:
@@ -146,7 +146,8 @@ class MotionTrack:
             late_ns = self._filter_stamp_ns - fix.stamp_ns
             if late_ns > 0:
                 xy = xy + filter_.way_m(late_ns * 1e-9)
-            lost = filter_.is_lost and math.dist(xy, expected) > _ELSEWHERE_M
+            elsewhere_m = _ELSEWHERE_M + 3.0 * self._positions.noise.std_m(fix)
+            lost = self._unheard and math.dist(xy, expected) > elsewhere_m
         verdict = self._gate.judge(time_s, xy, expected)
         if verdict == "skip":
             return False
@@ -155,7 +156,7 @@ class MotionTrack:
             self._place, xy = LocalPlace.around(fix.position), np.zeros(2)
             self._gate.restart(time_s, xy)
             filter_ = self._filter = None
-        self._fix = fix
+        self._fix, self._unheard = fix, False
         self._place = self._place.at(fix.position, antenna_up_m=self._lever[2])
         self._positions.noise.take(time_s, xy)
         sure_m, turned_rad = self._positions.noise.sure_white_std_m(fix), self._convergence_rad
@@ -236,6 +237,7 @@ class MotionTrack:
             # After a long silence the motion is unknown: two seconds of it are enough.
             self._filter.predict(min(silent_ns * 1e-9, 2.0))
             if silent_ns > CLOCK_LEAP_NS:
+                self._unheard = True
                 self._filter.doubt_position(MAX_SPEED_MPS * silent_ns * 1e-9)
             self._filter_stamp_ns = stamp_ns
         return self._filter
