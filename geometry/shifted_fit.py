@@ -31,6 +31,7 @@ class ShiftedFit(NamedTuple):
     `covariance` (C + 1, C + 1) is of sizes and shift, `quantile` (C + 1,) is half of their 95 %
     intervals in standard deviations. `without` (B, C + 1) has both as each stretch of driving
     leaves them that is left out; `block` (N,) says which that is, -1 where nothing was compared.
+    `at_the_end` says that the shift is the longest that was tried: it may be anything beyond.
     """
 
     sizes: Array
@@ -39,6 +40,7 @@ class ShiftedFit(NamedTuple):
     quantile: Array
     without: Array
     block: Indices
+    at_the_end: bool
 
     @property
     def shift_std_s(self) -> float:
@@ -115,7 +117,8 @@ def shifted_fit(
     covariance = told + held @ held.T
     freedom = _freedom(np.diagonal(told), np.diagonal(covariance), count)
     quantile = np.asarray(special.stdtrit(freedom, 0.975))
-    return ShiftedFit(theta[:-1], shift_s, covariance, quantile, without, block)
+    at_the_end = abs(shift_s) > longest_s - period_s
+    return ShiftedFit(theta[:-1], shift_s, covariance, quantile, without, block, at_the_end)
 
 
 def _freedom(told: Array, whole: Array, count: int) -> Array:

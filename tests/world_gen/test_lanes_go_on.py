@@ -131,7 +131,7 @@ def test_a_lane_more_begins_behind_a_taper_seven_times_as_long_as_it_is_wide(
 
 
 def test_a_lane_more_takes_more_of_short_roads_than_to_be_steeper_than_one_in_four():
-    """20 and 8 m gave 8.4 m for it: cars turned by 36° for a lane beside theirs."""
+    """20 and 8 m gave 8.4 m for it: cars turned by 32° for a lane beside theirs."""
     one_way = ONE_WAY | {"placement": "right_of:1"}
     nodes = {0: (0.0, 0.0), 5: (60.0, 0.0), 1: (80.0, 0.0), 2: (88.0, 0.0)}
     nodes |= {3: (-90.0, 0.0), 4: (0.0, -90.0)}

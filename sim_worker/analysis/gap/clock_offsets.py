@@ -15,7 +15,7 @@ import numpy as np
 from msgspec.structs import replace
 
 from foretwin.contracts.arrays import Array
-from foretwin.geometry.shifted_fit import LONGEST_SHIFT_S, shifted, shifted_fit
+from foretwin.geometry.shifted_fit import shifted, shifted_fit
 from foretwin.sim_worker.analysis.gap.pairs import FASTEST_MPS, smooth
 from foretwin.sim_worker.analysis.motion_record import PERIOD_S, MotionRecord
 
@@ -112,8 +112,8 @@ def _offset(unit: Array, sensor: Array, *, open_s: float) -> ClockOffset | None:
             around=np.array([1.0, 0.0]),
             prior_std=np.array([_GAIN_STD, np.inf]),
         )
-        if fit is None or abs(fit.shift_s) > LONGEST_SHIFT_S - PERIOD_S:
-            return None  # too little, or as far as is tried: it may be anything beyond
+        if fit is None or fit.at_the_end:
+            return None
         found.append((float(fit.half_widths[-1]) / _SURE, -fit.shift_s))
     std_s, late_s = min(found)
     apart_s = max(abs(late_s - other) for _, other in found)

@@ -124,15 +124,11 @@ def _lasts(values: Array) -> int:
 
 class Lateness(NamedTuple):
     """A column is stamped `late_s` later than positions, with a standard deviation: infinite where
-    nothing tells it."""
+    nothing tells it. `or_more` says that it is as late as is tried, or later."""
 
     late_s: float
     std_s: float
-
-    @property
-    def beyond(self) -> bool:
-        """Whether it is as late as is tried, or more."""
-        return abs(self.late_s) > _LATEST_S - GRID_S
+    or_more: bool = False
 
     @property
     def sure(self) -> bool:
@@ -169,13 +165,13 @@ def lateness(
         )
         if fit is None:
             return None
-        found.append((fit.shift_std_s, fit.shift_s))
-    std_s, late_s = min(found)
-    apart_s = max(abs(late_s - other) for _, other in found)
+        found.append((fit.shift_std_s, fit.shift_s, fit.at_the_end))
+    std_s, late_s, or_more = min(found)
+    apart_s = max(abs(late_s - other) for _, other, _ in found)
     doubts_s = [std_s, 0.5 * apart_s, GRID_S / np.sqrt(12.0)]
     if lever is not None:
         doubts_s.append(_LEVER_DOUBT_M / float(np.nanmedian(motion.speed_mps[motion.moves])))
-    return Lateness(late_s, float(np.linalg.norm(doubts_s)))
+    return Lateness(late_s, float(np.linalg.norm(doubts_s)), or_more)
 
 
 def _change(values: Array, apart: int) -> Array:

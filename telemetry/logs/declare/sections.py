@@ -144,7 +144,7 @@ class Sections:
         if told is not None:
             more = {"new_when": told.columns, "again_s": told.again_s}
             said.append(told.evidence)
-        if late is not None and late.beyond:
+        if late is not None and late.or_more:
             said.append(
                 f"late against positions by {late.late_s:+z.1f} s or more, which is as much as is "
                 "tried: not corrected (late_s does it)"
