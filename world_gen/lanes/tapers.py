@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 
 import numpy as np
@@ -9,10 +10,17 @@ import numpy as np
 from foretwin.contracts.arrays import Array
 from foretwin.world_gen.lanes.cluster import Cluster
 from foretwin.world_gen.lanes.lane_plans import CrossSection
-from foretwin.world_gen.lanes.legs import lateral_positions
+from foretwin.world_gen.lanes.legs import Heads, lateral_positions
 from foretwin.world_gen.lanes.stopping import NodeTags, before_crossings_m, must_reach_m
+from foretwin.world_gen.roads.headings import dot
 from foretwin.world_gen.roads.road_graph import EdgeKey
 
+TAPER_M = 6.0
+"""Lanes end so far before, and begin so far behind, a place where their number changes."""
+SAME_PLACE_M = 0.01
+"""Lanes whose middles part less run on into each other: it is what widths add up to."""
+SHARPEST_BEND_COS = math.cos(math.radians(75.0))
+"""Lanes run on through bends; sharper ones are driven as turns."""
 MAX_TRIM_M = 30.0
 """No end of a road gives way farther."""
 TAPER_PER_SHIFT = 7.0
@@ -26,6 +34,22 @@ TAPER_SHARE, MOST_WANTED = 0.3, 0.6
 may take for turns, and tapers, to be wider."""
 
 
+def plain_trims(
+    cluster: Cluster,
+    sections: Mapping[int, CrossSection],
+    shifts_m: Mapping[int, tuple[float, float]],
+    heads: Heads,
+) -> Array | None:
+    """Return what both legs give way at the least, (2,); None where their lanes run on."""
+    before, behind = _positions(cluster, sections, shifts_m)
+    fits = len(before) == len(behind) and np.allclose(before, behind, rtol=0.0, atol=SAME_PLACE_M)
+    fits = fits and cluster.keeps_widths(sections)
+    if fits and -dot(*(heads[leg.key] for leg in cluster.legs)) > SHARPEST_BEND_COS:
+        return None
+    room = (0.0 if fits else min(TAPER_M, TAPER_SHARE * leg.edge.length_m) for leg in cluster.legs)
+    return np.array(list(room))
+
+
 def tapers_m(
     cluster: Cluster,
     sections: Mapping[int, CrossSection],
@@ -36,7 +60,7 @@ def tapers_m(
 
     What one leg has no room for the other one gives.
     """
-    before, behind = lane_positions(cluster, sections, shifts_m)
+    before, behind = _positions(cluster, sections, shifts_m)
     shift_m = max(
         _farthest_m(
             np.array([at_m for at_m, along in before if along == driven]),
@@ -67,7 +91,7 @@ def tapers_m(
     return {leg.key: metres for leg, metres in zip(cluster.legs, found_m, strict=True)}
 
 
-def lane_positions(
+def _positions(
     cluster: Cluster,
     sections: Mapping[int, CrossSection],
     shifts_m: Mapping[int, tuple[float, float]],

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 
 import numpy as np
@@ -18,12 +17,11 @@ from foretwin.world_gen.lanes.stopping import NodeTags, must_reach_m
 from foretwin.world_gen.lanes.tapers import (
     MAX_TRIM_M,
     MOST_WANTED,
-    TAPER_SHARE,
-    lane_positions,
+    plain_trims,
     tapers_m,
 )
 from foretwin.world_gen.lanes.turning_room import turning_trims
-from foretwin.world_gen.roads.headings import dot, heading_out
+from foretwin.world_gen.roads.headings import heading_out
 from foretwin.world_gen.roads.road_graph import EdgeKey, RoadEdge
 
 CORNER_M = 3.5
@@ -32,12 +30,6 @@ RING_CORNER_M = 1.5
 _LEG_LOOK_M = 45.0
 _OWN_START_M = 15.0
 """What overlaps a leg farther out belongs to another place, unless it goes on from here."""
-TAPER_M = 6.0
-"""Lanes end so far before, and begin so far behind, a place where their number changes."""
-SAME_PLACE_M = 0.01
-"""Lanes whose middles part less run on into each other: it is what widths add up to."""
-SHARPEST_BEND_COS = math.cos(math.radians(75.0))
-"""Lanes run on through bends; sharper ones are driven as turns."""
 MOST_CUT = 0.8
 """Share of an edge that its two ends may take to clear other roads."""
 
@@ -64,7 +56,7 @@ def trims(
     nodes = _node_trims([c for c in clusters if len(c.nodes) == 1], sections, heads)
     for cluster in clusters:
         if cluster.plain:
-            values = _plain_trims(cluster, sections, shifts_m, heads)
+            values = plain_trims(cluster, sections, shifts_m, heads)
             if values is not None:
                 tapers |= tapers_m(cluster, sections, shifts_m, node_tags)
         else:
@@ -114,22 +106,6 @@ def _share(
         else:
             shared = [n * room / sum(need) for n in need]
         wanted.update(zip(ends, shared, strict=True))
-
-
-def _plain_trims(
-    cluster: Cluster,
-    sections: Mapping[int, CrossSection],
-    shifts_m: Mapping[int, tuple[float, float]],
-    heads: Heads,
-) -> Array | None:
-    """Lanes of one road run on where they fit (None); where lanes change there is a taper."""
-    before, behind = lane_positions(cluster, sections, shifts_m)
-    fits = len(before) == len(behind) and np.allclose(before, behind, rtol=0.0, atol=SAME_PLACE_M)
-    fits = fits and cluster.keeps_widths(sections)
-    if fits and -dot(*(heads[leg.key] for leg in cluster.legs)) > SHARPEST_BEND_COS:
-        return None
-    room = (0.0 if fits else min(TAPER_M, TAPER_SHARE * leg.edge.length_m) for leg in cluster.legs)
-    return np.array(list(room))
 
 
 def _node_trims(
