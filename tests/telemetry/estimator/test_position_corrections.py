@@ -240,6 +240,19 @@ def test_who_stood_before_a_hole_heads_as_before_where_rough_fixes_are_off_by_th
     assert all(one.yaw_valid for one in states if one.stamp_ns > 15e9)
 
 
+def test_long_after_a_hole_one_fix_far_off_is_no_other_place() -> None:
+    """A parked car that is heard of again, drives off, and 8 s later one fix lies 30 m aside."""
+    samples = around_a_hole(before_mps=0.0, after_mps=0.0, resumes_m=(160.0, 0.0))[:86]
+    for tick in range(40):
+        time_s = 82.0 + 0.5 * tick
+        aside_m = 30.0 if tick == 20 else 0.0
+        samples.append(("speed", SpeedSample(stamp_ns=round(time_s * 1e9), speed_mps=4.0)))
+        samples.append(fix(time_s, 160.0 + 2.0 * tick, aside_m, 0.8))
+    after = [state for state in states_of(samples) if state.stamp_ns > 82e9]
+    assert len(after) > 30
+    assert all(state.yaw_valid for state in after)
+
+
 def test_fixes_of_a_telephone_network_are_rough_and_no_other_place() -> None:
     """Taken for one, each began the motion anew: off by 137 m in the middle instead of 78."""
     random, samples = np.random.default_rng(1), list[Sample]()
