@@ -22,6 +22,8 @@ BLOCK_S = 6.0
 LONGEST_SHIFT_S = 1.0
 """Sought for either way. Chosen: what telephones and adapters send is late by up to 0.6 s."""
 _LEAST_BLOCKS = 5
+LEAST_S = _LEAST_BLOCKS * BLOCK_S
+"""Nothing is fitted to less."""
 _ROUNDS = 3
 
 
@@ -77,12 +79,12 @@ def shifted_fit(
     """Fit y (N,) by columns (N, C), shifted together by up to `longest_s`; grid of `period_s`.
 
     Sizes are `around` (C,) give or take `prior_std` (C,), infinite where nothing is known, and the
-    shift is 0 give or take `shift_prior_s`. None for less than 30 s that can be compared.
+    shift is 0 give or take `shift_prior_s`. None for less than `LEAST_S` that can be compared.
     """
     longest = round(longest_s / period_s)
     known = np.isfinite(y) & _known_around(columns, longest)
     block = _blocks(known, period_s)
-    if known.sum() * period_s < _LEAST_BLOCKS * BLOCK_S:
+    if known.sum() * period_s < LEAST_S:
         return None
     count = int(block.max()) + 1
     most = 0 if np.isfinite(shift_prior_s) else longest

@@ -21,6 +21,7 @@ from foretwin.orchestrator.commands.compare_text import after_lines
 from foretwin.orchestrator.commands.gap_text import (
     WIDTH,
     DrivenBy,
+    not_held_lines,
     table_lines,
     turning_lines,
     turning_object,
@@ -35,7 +36,7 @@ from foretwin.sim_worker.analysis.gap.clock_offsets import on_one_clock
 from foretwin.sim_worker.analysis.gap.errors import GapLimits, GapMeter, GapRow, gap_table
 from foretwin.sim_worker.analysis.gap.free_run import FreeRunner
 from foretwin.sim_worker.analysis.gap.measured_motion import LONGEST_GAP_S, motion_on_grid
-from foretwin.sim_worker.analysis.gap.measured_turning import TurningGap, turning_gap
+from foretwin.sim_worker.analysis.gap.measured_turning import NotHeld, TurningGap, turning_gap
 from foretwin.sim_worker.analysis.gap.verdict import FaultDetector, without_manual_commands
 from foretwin.sim_worker.analysis.motion_record import MotionRecorder
 from foretwin.sim_worker.vehicle.parameters import load_vehicle
@@ -57,8 +58,8 @@ class GapReport(NamedTuple):
     verdicts: list[Verdict]
     undecided: str
     """What departs, where nobody is accused."""
-    turning: TurningGap | None
-    """The model driven by measured steering and speed; None where these are not enough."""
+    turning: TurningGap | NotHeld
+    """The model driven by measured steering and speed, or why these are not enough."""
     driven_by: DrivenBy
     refused: dict[str, int]
     """Samples that the reader refused, by reason."""
@@ -112,7 +113,8 @@ def _measured(
     for channel, message in messages:
         recorder.handle(channel, message)
     record = without_manual_commands(recorder.record())
-    turning = turning_gap(record, vehicle)
+    found = turning_gap(record, vehicle)
+    turning = found if isinstance(found, TurningGap) else None
     by_hand = turning is not None and not np.isfinite(record.command_accel_mps2).any()
     if turning is not None and by_hand:
         # States and pairs of signals that are compared must not be of different times.
@@ -151,7 +153,7 @@ def _measured(
         alarms=alarms,
         verdicts=verdicts,
         undecided=turning.departure if turning is not None and by_hand else detector.undecided,
-        turning=turning,
+        turning=found,
         driven_by=driven_by,
         refused=refused,
         estimate=estimator.consistency,
@@ -200,13 +202,15 @@ def as_object(report: GapReport) -> dict[str, Any]:
 
     `reason` says why nobody is accused, null where somebody is.
     """
+    turning = report.turning
     return {
         "vehicle_id": report.info.vehicle_id,
         "independent": all(row.independent for row in report.rows),
         "driven_by": report.driven_by,
         "rows": [row._asdict() for row in report.rows],
         "reason": why_undecided(report.verdicts, report.undecided, driven_by=report.driven_by),
-        "turning": None if report.turning is None else turning_object(report.turning),
+        "turning": None if isinstance(turning, NotHeld) else turning_object(turning),
+        "turning_not_held": turning.why if isinstance(turning, NotHeld) else None,
         "verdicts": [msgspec.to_builtins(verdict) for verdict in report.verdicts],
         "alarms": [msgspec.to_builtins(alarm) for alarm in report.alarms],
         "refused": report.refused,
@@ -220,8 +224,10 @@ def _lines(report: GapReport) -> list[str]:
         left = ", ".join(f"{count} {reason}" for reason, count in sorted(report.refused.items()))
         lines.append(f"refused: {left}")
     lines += textwrap.wrap(estimate_line(report.estimate), WIDTH, subsequent_indent="  ")
-    if report.turning is not None:
+    if isinstance(report.turning, TurningGap):
         lines += turning_lines(report.turning)
+    elif report.driven_by == "estimated commands":
+        lines += [*not_held_lines(report.turning), ""]
     reason = why_undecided(report.verdicts, report.undecided, driven_by=report.driven_by)
     start_ns = report.info.start_stamp_ns
     return lines + list(verdict_lines(report.verdicts, report.alarms, reason, start_ns=start_ns))

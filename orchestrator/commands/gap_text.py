@@ -12,7 +12,7 @@ from foretwin.contracts.arrays import Array
 from foretwin.contracts.gap import GapAlarm, Verdict
 from foretwin.sim_worker.analysis.gap.clock_offsets import ClockOffset
 from foretwin.sim_worker.analysis.gap.errors import GapRow
-from foretwin.sim_worker.analysis.gap.measured_turning import TurningGap
+from foretwin.sim_worker.analysis.gap.measured_turning import NotHeld, TurningGap
 
 WIDTH = 80
 _DEGREES = 57.29578
@@ -110,6 +110,11 @@ _CONDITION = (
     "the vehicle file's wheelbase, tyres and inertia, its steering ratio give or take what it "
     "says, and bends and speeds as in this drive"
 )
+
+
+def not_held_lines(turning: NotHeld) -> list[str]:
+    """Return why the model was not driven by what was measured."""
+    return _wrapped(f"the model was not driven by what was measured: {turning.why}", indent="  ")
 
 
 def turning_lines(turning: TurningGap) -> list[str]:

@@ -8,14 +8,13 @@ vehicle file is told beside. Each second is predicted from the rest of the drive
 
 from __future__ import annotations
 
-import math
 from typing import NamedTuple
 
 import numpy as np
 
 from foretwin.contracts.arrays import Array, Stamps
 from foretwin.contracts.vehicle import VehicleParameters
-from foretwin.geometry.shifted_fit import ShiftedFit, shifted_fit
+from foretwin.geometry.shifted_fit import LEAST_S, LONGEST_SHIFT_S, ShiftedFit, shifted_fit
 from foretwin.sim_worker.analysis.gap.clock_offsets import (
     ClockOffset,
     on_tick,
@@ -26,19 +25,24 @@ from foretwin.sim_worker.analysis.gap.clock_offsets import (
 from foretwin.sim_worker.analysis.gap.findings import GAIN_LEFT_OPEN
 from foretwin.sim_worker.analysis.gap.free_run import FreeRunner, start_states, tire_angles
 from foretwin.sim_worker.analysis.gap.measured_motion import MeasuredMotion
+from foretwin.sim_worker.analysis.gap.turning_priors import (
+    gyro_at_standstill,
+    response_std_s,
+    steering_prior,
+)
 from foretwin.sim_worker.analysis.motion_record import PERIOD_S, MotionRecord
 from foretwin.sim_worker.vehicle.lag import without_lags
 
-_ROLLS_MPS, _STANDS_MPS = 1.0, 0.1
-_LEAST_STILL_S, _LEAST_DRIFT_RADPS = 5, 3e-4
-"""So long a car stands that tells its gyro's bias, and by so much that may drift. Chosen."""
+_ROLLS_MPS = 1.0
 _RUN = round(2.0 / PERIOD_S)
 _SECOND = round(1.0 / PERIOD_S)
 """Of a run the last second is compared: where it began is forgotten by then."""
-_UNKNOWN_SHARE, _UNKNOWN_OFFSET_RAD = 0.1, 0.02
-"""How far a ratio and a zero of the steering may be off where the vehicle file does not say."""
 _SHARE = 0.95
 _LEAST_SECONDS = 20
+_NO_CLOCK = (
+    "how late the steering is stamped cannot be told from how the car turns: it is by "
+    f"{LONGEST_SHIFT_S:g} s or more, or the stretches that have all are too short"
+)
 
 
 class MeasuredDrive(NamedTuple):
@@ -49,6 +53,12 @@ class MeasuredDrive(NamedTuple):
 
     tire_rad: Array
     speed_mps: Array
+
+
+class NotHeld(NamedTuple):
+    """Says why the model's turning is held against no gyro."""
+
+    why: str
 
 
 class TurningGap(NamedTuple):
@@ -103,81 +113,42 @@ class TurningGap(NamedTuple):
         return float(np.mean(np.abs(self.error_radps) <= self.half_width_radps))
 
 
-def turning_gap(record: MotionRecord, vehicle: VehicleParameters) -> TurningGap | None:
-    """Drive the model by measured steering and speed and compare its turning with the gyro.
-
-    None where steering, speed or gyro are missing, or less than 30 s of driving have all three.
-    """
+def turning_gap(record: MotionRecord, vehicle: VehicleParameters) -> TurningGap | NotHeld:
+    """Drive the model by measured steering and speed and compare its turning with the gyro."""
     tire, gyro = tire_angles(record, vehicle).measured_rad, record.yaw_rate_radps
     if not (np.isfinite(tire) & np.isfinite(gyro) & np.isfinite(record.speed_mps)).any():
-        return None
+        return NotHeld("steering, speed and gyro were not all measured")
     runner = FreeRunner(without_lags(vehicle))
     speed_clock = speed_offset(record)
     clock = speed_clock or ClockOffset(0.0, 0.0)
     model = turning_of_model(runner, record, tire_rad=tire, late_s=(clock.late_s, clock.late_s))
     more = turning_offset(gyro, model)
     if more is None:
-        return None
+        both_s = PERIOD_S * np.count_nonzero(np.isfinite(gyro) & np.isfinite(model))
+        return NotHeld(_too_short(both_s) if both_s < LEAST_S else _NO_CLOCK)
     # The first run was on the speed's clock; on its own the steering may be earlier or later.
     clock = ClockOffset(clock.late_s + more.late_s, more.std_s)
     by_speed_s = clock.late_s if speed_clock is None else speed_clock.late_s
     model = turning_of_model(runner, record, tire_rad=tire, late_s=(clock.late_s, by_speed_s))
     speed = on_tick(record.speed_mps, -by_speed_s)
     columns = np.stack([model, speed / vehicle.wheelbase_m.value, np.ones(len(model))], axis=1)
-    bias, bias_std = _at_standstill(record)
+    bias, bias_std = gyro_at_standstill(record)
     fit = shifted_fit(
         gyro,
         columns,
         period_s=PERIOD_S,
         around=np.array([1.0, 0.0, bias]),
-        prior_std=np.array([*_prior(vehicle), bias_std]),
+        prior_std=np.array([*steering_prior(vehicle), bias_std]),
         shift_prior_s=clock.std_s,
     )
     if fit is None:
-        return None
+        return NotHeld(_NO_CLOCK)
     steered = as_commands(tire, clock.late_s) + fit.sizes[1]
     typical_mps = float(np.nanmedian(speed[fit.block >= 0]))
     drive = MeasuredDrive(steered, speed)
     return _told(
-        record, columns, fit, drive, clock, speed_clock, _response_std_s(vehicle, typical_mps)
+        record, columns, fit, drive, clock, speed_clock, response_std_s(vehicle, typical_mps)
     )
-
-
-def _at_standstill(record: MotionRecord) -> tuple[float, float]:
-    """Return the gyro's bias and its standard deviation, infinite where the car never stands."""
-    gyro = record.yaw_rate_radps[record.speed_mps < _STANDS_MPS]
-    gyro = gyro[np.isfinite(gyro)]
-    seconds = gyro[: len(gyro) // _SECOND * _SECOND].reshape(-1, _SECOND).mean(axis=1)
-    if len(seconds) < _LEAST_STILL_S:
-        return 0.0, float("inf")
-    drift = max(float(np.std(seconds)), _LEAST_DRIFT_RADPS)
-    return float(np.median(seconds)), drift
-
-
-def _prior(vehicle: VehicleParameters) -> tuple[float, float]:
-    """Return how far gain and steering offset may be off by the vehicle file."""
-    ratio, base = (
-        (one.std or _UNKNOWN_SHARE * one.value) / one.value
-        for one in (vehicle.steering_ratio, vehicle.wheelbase_m)
-    )
-    return math.hypot(ratio, base), vehicle.steering_offset_rad.std or _UNKNOWN_OFFSET_RAD
-
-
-def _response_std_s(vehicle: VehicleParameters, speed_mps: float) -> float:
-    """Return how far a planar car's lag behind its tyres, I_z v (1/C_f + 1/C_r) / L², may be off.
-
-    Rajamani, Vehicle Dynamics and Control, 2012, 2.3; deviations are the vehicle file's.
-    """
-    front, rear = vehicle.front_cornering_stiffness_npr, vehicle.rear_cornering_stiffness_npr
-    inertia, base_m = vehicle.yaw_inertia_kgm2, vehicle.wheelbase_m.value
-    per_mps = 1.0 / base_m**2
-    soft = 1.0 / front.value + 1.0 / rear.value
-    off = (
-        (inertia.std or 0.0) * soft,
-        inertia.value * (front.std or 0.0) / front.value**2,
-        inertia.value * (rear.std or 0.0) / rear.value**2,
-    )
-    return speed_mps * per_mps * math.hypot(*off)
 
 
 def as_commands(tire_rad: Array, late_s: float) -> Array:
@@ -227,7 +198,7 @@ def _told(
     clock: ClockOffset,
     speed_clock: ClockOffset | None,
     response_std_s: float,
-) -> TurningGap | None:
+) -> TurningGap | NotHeld:
     rows = np.stack([on_tick(column, fit.shift_s) for column in columns.T], axis=1)
     slope = -np.gradient(rows @ fit.sizes) / PERIOD_S
     gyro = record.yaw_rate_radps
@@ -237,7 +208,7 @@ def _told(
     starts = starts[sums[starts + _SECOND] - sums[starts] == _SECOND]
     starts = starts[fit.block[starts] == fit.block[starts + _SECOND - 1]]
     if len(starts) < _LEAST_SECONDS:
-        return None
+        return NotHeld(_too_short(len(starts)))
 
     def mean(values: Array) -> Array:
         return np.asarray(values[starts[:, None] + np.arange(_SECOND)].mean(axis=1))
@@ -296,3 +267,8 @@ def _half_width(
     parts = np.sort(np.abs(error) / scale(turning, parameters))
     rank = min(int(np.ceil(_SHARE * (len(parts) + 1))), len(parts)) - 1
     return np.asarray(parts[rank] * scale(now_turning, now_parameters))
+
+
+def _too_short(known_s: float) -> str:
+    together = f"are known together for {known_s:.0f} s alone, which is too short"
+    return f"steering, speed and gyro of a moving car {together}"

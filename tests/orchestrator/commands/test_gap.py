@@ -92,12 +92,14 @@ def test_without_commands_and_steering_it_says_that_nobody_can_be_accused(
     assert run(["gap", str(file)]) == 0
     said = capsys.readouterr().out
     assert "commands were not recorded" in said
+    why = "steering, speed and gyro were not all measured"
+    assert f"the model was not driven by what was measured: {why}" in " ".join(said.split())
     assert "verdict" not in said
     assert run(["gap", str(file), "--json"]) == 0
     told = json.loads(capsys.readouterr().out)
     assert told["reason"].startswith("commands were not recorded")
     assert (told["independent"], told["driven_by"]) == (False, "estimated commands")
-    assert told["turning"] is None
+    assert (told["turning"], told["turning_not_held"]) == (None, why)
     assert told["rows"]
     assert told["verdicts"] == []
 
@@ -120,6 +122,7 @@ def test_a_car_driven_by_hand_is_followed_at_its_measured_steering_and_speed(
     assert (told["independent"], told["driven_by"]) == (True, "measured steering and speed")
     assert told["reason"].startswith("commands were not recorded: the model was driven by steering")
     turning = told["turning"]
+    assert told["turning_not_held"] is None
     assert turning["within_share"] >= 0.85
     assert turning["clock_late_s"]["steering"]["half_95"] < 0.02
     assert abs(turning["clock_late_s"]["steering"]["value"]) < 0.01

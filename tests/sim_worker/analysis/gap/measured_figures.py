@@ -22,7 +22,7 @@ from foretwin.contracts.drive import GnssFix, ImuSample, SpeedSample, SteeringSa
 from foretwin.contracts.frames import LocalFrame
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.sim_worker.analysis.gap.clock_offsets import ClockOffset
-from foretwin.sim_worker.analysis.gap.measured_turning import TurningGap, turning_gap
+from foretwin.sim_worker.analysis.gap.measured_turning import NotHeld, TurningGap, turning_gap
 from foretwin.sim_worker.analysis.motion_record import MotionRecorder
 from foretwin.sim_worker.vehicle.parameters import load_vehicle
 from foretwin.telemetry.logs.opening import open_log
@@ -68,7 +68,7 @@ def _stamped(message: Any, late: Lateness) -> Any:
 
 def turning_of(
     samples: Iterable[tuple[str, Any]], vehicle: VehicleParameters | None = None
-) -> TurningGap | None:
+) -> TurningGap | NotHeld:
     """Return what the samples of a drive say of the model's turning."""
     kept = list(samples)
     place = next(m.position for _, m in kept if isinstance(m, GnssFix))
@@ -106,8 +106,8 @@ def print_standins(seeds: range) -> None:
     for seed in seeds:
         steering_s, speed_s, gyro_s = np.random.default_rng(seed).uniform(0.0, 0.3, 3)
         gap = turning_of(hand_driven(seed, Lateness(steering_s, speed_s, gyro_s, 0.01)))
-        if gap is None:
-            print(f"seed {seed}: too little driving", flush=True)
+        if isinstance(gap, NotHeld):
+            print(f"seed {seed}: {gap.why}", flush=True)
             continue
         counted += 1
         within.append(gap.within)
@@ -137,8 +137,10 @@ def print_logs(words: Iterable[str]) -> None:
             if from_s <= (one[1].stamp_ns - start_ns) * 1e-9 < to_s  # type: ignore[attr-defined]
         ]
         gap = turning_of(part)
-        said = f"{word}: steering, speed or gyro are missing" if gap is None else None
-        print(said or _line("/".join(Path(name).parts[-2:]), gap), flush=True)  # type: ignore[arg-type]
+        if isinstance(gap, NotHeld):
+            print(f"{word}: {gap.why}", flush=True)
+            continue
+        print(_line("/".join(Path(name).parts[-2:]), gap), flush=True)
 
 
 def main(words: list[str]) -> None:

@@ -3,17 +3,21 @@
 from __future__ import annotations
 
 import math
+import re
 from typing import Any
 
 import numpy as np
 import pytest
 
 from foretwin.sim_worker.analysis.gap.clock_offsets import ClockOffset, on_one_clock
-from foretwin.sim_worker.analysis.gap.measured_turning import TurningGap
+from foretwin.sim_worker.analysis.gap.measured_turning import NotHeld, TurningGap
 from tests.sim_worker.analysis.gap.measured_figures import Lateness, hand_driven, turning_of
 from tests.sim_worker.faulty_standin import model_with
 
-COVERS = ("foretwin.sim_worker.analysis.gap.clock_offsets",)
+COVERS = (
+    "foretwin.sim_worker.analysis.gap.clock_offsets",
+    "foretwin.sim_worker.analysis.gap.turning_priors",
+)
 
 SEED = 300
 LATE = Lateness(steering_s=0.13, speed_s=0.21, gyro_s=0.04, bias_radps=0.02, position_s=0.3)
@@ -22,7 +26,7 @@ LATE = Lateness(steering_s=0.13, speed_s=0.21, gyro_s=0.04, bias_radps=0.02, pos
 @pytest.fixture(scope="module")
 def gap() -> TurningGap:
     found = turning_of(hand_driven(SEED, LATE))
-    assert found is not None
+    assert isinstance(found, TurningGap)
     return found
 
 
@@ -56,7 +60,7 @@ def test_each_second_is_within_the_interval_that_the_others_say(gap: TurningGap)
 
 def test_a_model_that_turns_otherwise_is_told_and_nobody_named() -> None:
     found = turning_of(hand_driven(SEED, LATE), model_with("steering_ratio"))
-    assert found is not None
+    assert isinstance(found, TurningGap)
     assert found.gain != pytest.approx(1.0, abs=0.2)
     assert "times as the model does at the measured steering" in found.departure
     assert "or the car's steering sensor" in found.departure
@@ -65,7 +69,7 @@ def test_a_model_that_turns_otherwise_is_told_and_nobody_named() -> None:
 @pytest.mark.parametrize("channel", ["steering", "speed", "imu"])
 def test_without_steering_speed_or_gyro_there_is_nothing_to_compare(channel: str) -> None:
     samples = [one for one in hand_driven(SEED, Lateness()) if one[0] != channel]
-    assert turning_of(samples) is None
+    assert turning_of(samples) == NotHeld("steering, speed and gyro were not all measured")
 
 
 def test_samples_are_put_on_one_clock_where_it_is_told_well_enough() -> None:
@@ -84,11 +88,15 @@ def test_samples_are_put_on_one_clock_where_it_is_told_well_enough() -> None:
 
 
 def test_half_a_minute_is_needed() -> None:
-    assert turning_of(hand_driven(SEED, Lateness(), end_s=25.0)) is None
+    short = turning_of(hand_driven(SEED, Lateness(), end_s=25.0))
+    assert isinstance(short, NotHeld)
+    assert re.search(r"known together for (1\d|2[0-5]) s alone, which is too short", short.why)
 
 
 def test_a_sensor_later_than_is_tried_is_not_told_to_be_as_late_as_that() -> None:
     found = turning_of(hand_driven(SEED, Lateness(speed_s=1.6)))
-    assert found is not None
+    assert isinstance(found, TurningGap)
     assert found.speed_clock is None
-    assert turning_of(hand_driven(SEED, Lateness(steering_s=1.6))) is None
+    late = turning_of(hand_driven(SEED, Lateness(steering_s=1.6)))
+    assert isinstance(late, NotHeld)
+    assert "how late the steering is stamped cannot be told" in late.why
