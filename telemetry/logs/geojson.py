@@ -40,6 +40,10 @@ def geojson_lines(path: Path) -> list[GeoLine]:
         document = json.loads(path.read_text(encoding="utf-8-sig"))
     except (ValueError, RecursionError) as error:
         raise LogError(f"{path}: no valid JSON: {error}") from None
+    if not isinstance(document, dict) or not isinstance(document.get("type"), str):
+        raise LogError(
+            f"{path}: no GeoJSON: an object whose `type` is such as FeatureCollection is expected"
+        )
     seen: list[str] = []
     lines = list(_lines(document, {}, seen))
     if not lines:

@@ -130,6 +130,9 @@ def test_geojson_may_begin_with_a_mark_of_its_bytes(tmp_path: Path) -> None:
     [
         ('{"type": "FeatureCollection", "features": []}', "holds no LineString but nothing"),
         ('{"type": "Point", "coordinates": [1, 2]}', "holds no LineString but Point"),
+        ('{"bbox": [1, 2]}', "no GeoJSON: an object whose `type` is such as FeatureCollection"),
+        ("[1, 2]", "no GeoJSON: an object"),
+        ('{"type": 5}', "no GeoJSON: an object"),
         ('{"type": "LineString", "coordinates": []}', "an empty LineString"),
         ('{"type": "LineString", "coordinates": [[13.4, 52.5]]}', "a line needs two"),
         ("{", "no valid JSON"),
