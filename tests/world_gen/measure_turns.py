@@ -5,7 +5,8 @@ prints one row for each map, one for all, and one for the tracks, which are meas
 
 - `turned`: connections whose heading leaves the angle from lane to lane by more than 30°; then
   those of them that leave so far the angle of lanes and of all the map's roads between them too,
-  which turn where two arms of a crossing lie aside of one another; then U-turns;
+  which turn where two arms of a crossing lie aside of one another; then the same of connections
+  from, to or by way of a ring (R), and U-turns;
 - `loops`: connections that turn by more than 270° from their lane, U-turns counted after them;
 - `beside`: how many but those back into the same road lie by more than 1, 2 and 4 m outside the
   shape that their roads span, where these meet in one node: `beside_m`;
@@ -33,7 +34,7 @@ import numpy as np
 import shapely
 from scipy.ndimage import gaussian_filter1d
 
-from foretwin.contracts.world import Connection, World
+from foretwin.contracts.world import World
 from foretwin.geometry.polyline import meeting, units
 from foretwin.world_gen.build import build_region
 from foretwin.world_gen.junctions.find_intersections import find_intersections
@@ -164,6 +165,7 @@ def turns_of(world: World, roads: RoadsDriven) -> Iterator[Turn]:
         whole = np.concatenate([start[-2:-1], c.centerline, end[1:2]])
         before, behind = start[-1] - start[-2], end[1] - end[0]
         angle = abs(math.remainder(_yaw(behind) - _yaw(before), math.tau))
+        back = c.turn == "u_turn" or angle > math.radians(160.0)
         counts = c.turn == near_side and c.signal_group_id is not None
         beside = math.nan
         if c.turn != "u_turn":
@@ -171,7 +173,7 @@ def turns_of(world: World, roads: RoadsDriven) -> Iterator[Turn]:
         longer = np.concatenate([start[:-1], c.centerline, end[1:]])
         yield Turn(
             name=c.id,
-            kind=_kind(c, angle),
+            kind="u_turn" if back else "ring" if roads.by_ring(from_lane, to_lane) else "turn",
             turned_rad=turned_rad(whole),
             left_rad=left_interval_rad(c.centerline, before, behind),
             left_roads_rad=left_interval_rad(
@@ -187,10 +189,6 @@ def turns_of(world: World, roads: RoadsDriven) -> Iterator[Turn]:
 
 def _yaw(direction: np.ndarray) -> float:
     return math.atan2(direction[1], direction[0])
-
-
-def _kind(c: Connection, angle_rad: float) -> str:
-    return "u_turn" if c.turn == "u_turn" or angle_rad > math.radians(160.0) else "turn"
 
 
 def tracked_radii_m(folder: Path) -> list[float]:
@@ -223,8 +221,8 @@ def tracked_radii_m(folder: Path) -> list[float]:
 
 def row_of(turns: list[Turn]) -> str:
     """Return the figures of one map, or of several, as a row."""
-    turned = [t for t in turns if t.kind == "turn" and t.left_rad > ALLOWED_RAD]
-    off_roads = [t for t in turned if t.left_roads_rad > ALLOWED_RAD]
+    turned = [t for t in turns if t.kind != "u_turn" and t.left_rad > ALLOWED_RAD]
+    off_roads = [t.kind for t in turned if t.left_roads_rad > ALLOWED_RAD]
     u_turned = [t for t in turns if t.kind == "u_turn" and t.left_rad > ALLOWED_RAD]
     radii = "  ".join(
         _quartiles([t.radius_m for t in turns if low <= t.near_side_at_lights_rad <= high])
@@ -233,8 +231,9 @@ def row_of(turns: list[Turn]) -> str:
     step = np.percentile([t.step_pm for t in turns], [50, 90, 99])
     rate = np.percentile([t.rate_pm2 for t in turns], [50, 90, 99])
     looped = [t.kind for t in turns if t.turned_rad > LOOP_RAD]
-    loops = f"loops {looped.count('turn')} + {looped.count('u_turn')} U"
-    counts = f"{len(turned):4d} {len(off_roads):4d} + {len(u_turned):3d} U  {loops}"
+    loops = f"loops {len(looped) - looped.count('u_turn')} + {looped.count('u_turn')} U"
+    off = f"{off_roads.count('turn'):4d} + {off_roads.count('ring'):2d} R"
+    counts = f"{len(turned):4d} {off} + {len(u_turned):3d} U  {loops}"
     aside = "/".join(str(sum(t.beside_m > m for t in turns)) for m in BESIDE_M)
     shape = f"step {_words(step)}  rate {_words(rate)}"
     return f"{len(turns):7d} turned {counts}  beside {aside}  radius {radii}  {shape}"
@@ -263,8 +262,9 @@ def main() -> None:
         every += turns
         print(f"{name:14}{row_of(turns)}  ({time.process_time() - begin_s:.0f} s)", flush=True)
         worst = sorted(turns, key=lambda t: -t.left_roads_rad)
-        for t in [t for t in worst if t.kind == "turn"][: chosen.worst]:
-            print(f"    {math.degrees(t.left_roads_rad):5.0f}°  {t.radius_m:5.1f} m  {t.name}")
+        for t in [t for t in worst if t.kind != "u_turn"][: chosen.worst]:
+            turned = f"{math.degrees(t.left_roads_rad):5.0f}°"
+            print(f"    {turned}  {t.radius_m:5.1f} m  {t.kind:4}  {t.name}")
     print(f"{'all':14}{row_of(every)}")
     print(f"{'tracks':14}{'':62}radius {_quartiles(tracked_radii_m(data / TRACKS))}")
 

@@ -18,6 +18,7 @@ from foretwin.world_gen.roads.road_graph import RoadGraph
 
 FARTHEST_M = 150.0
 """Of roads between two lanes; no place is wider."""
+_RINGS = ("roundabout", "circular")
 LEAST_M = 0.5
 """A shorter piece has no direction that one would drive in."""
 
@@ -28,6 +29,14 @@ class _Along(NamedTuple):
     start_node: int
     end_node: int
     xy_m: np.ndarray
+    ring: bool
+
+
+class _Piece(NamedTuple):
+    """A road of the map; `ring` where it is part of a circular junction."""
+
+    xy_m: np.ndarray
+    ring: bool
 
 
 class RoadsDriven:
@@ -35,18 +44,18 @@ class RoadsDriven:
 
     def __init__(self, graph: RoadGraph, frame: LocalFrame) -> None:
         """Index the edges, in a World's frame, by their way and nodes, and by where they end."""
-        self._by_name: dict[tuple[int, int, int], np.ndarray] = {}
-        self._onward: dict[int, list[tuple[int, np.ndarray, float]]] = {}
+        self._by_name: dict[tuple[int, int, int], _Piece] = {}
+        self._onward: dict[int, list[tuple[int, _Piece, float]]] = {}
         origin = graph.frame.origin
         moved_m = local_from_geo(frame, np.array([origin.lat_deg]), np.array([origin.lon_deg]))
         for edge in graph.edges:
-            line = edge.xy_m + moved_m
+            line, ring = edge.xy_m + moved_m, edge.tags.get("junction") in _RINGS
             for a, b, xy_m in (
                 (edge.start_node, edge.end_node, line),
                 (edge.end_node, edge.start_node, line[::-1]),
             ):
-                self._by_name[edge.way_id, a, b] = xy_m
-                self._onward.setdefault(a, []).append((b, xy_m, edge.length_m))
+                piece = self._by_name[edge.way_id, a, b] = _Piece(xy_m, ring)
+                self._onward.setdefault(a, []).append((b, piece, edge.length_m))
 
     def lines(self, start: Lane, end: Lane) -> list[np.ndarray]:
         """Return the roads (N, 2) from the end of one lane to another, piece by piece.
@@ -57,9 +66,15 @@ class RoadsDriven:
         first, last = self._edge_of(start), self._edge_of(end)
         return [
             _left_of_it(first.xy_m, start.centerline[-1], behind=True),
-            *self._between(first.end_node, last.start_node),
+            *(piece.xy_m for piece in self._between(first.end_node, last.start_node)),
             _left_of_it(last.xy_m, end.centerline[0], behind=False),
         ]
+
+    def by_ring(self, start: Lane, end: Lane) -> bool:
+        """Whether one comes from lane to lane by a circular junction."""
+        first, last = self._edge_of(start), self._edge_of(end)
+        between = self._between(first.end_node, last.start_node)
+        return first.ring or last.ring or any(piece.ring for piece in between)
 
     def directions(self, start: Lane, end: Lane) -> Iterator[np.ndarray]:
         """Yield the direction (2,) of each piece of road from the end of one lane to another."""
@@ -70,15 +85,15 @@ class RoadsDriven:
         way, start, end, side = lane.id.split(".")
         nodes = int(start), int(end)
         a, b = nodes if side[0] == "f" else nodes[::-1]
-        line = self._by_name.get((int(way[1:]), a, b))
+        piece = self._by_name.get((int(way[1:]), a, b))
         # Past driveways a World's road is of several edges.
-        if line is None:
-            line = np.concatenate(self._between(a, b, farthest_m=math.inf))
-        return _Along(a, b, line)
+        pieces = self._between(a, b, farthest_m=math.inf) if piece is None else [piece]
+        line = np.concatenate([one.xy_m for one in pieces])
+        return _Along(a, b, line, any(one.ring for one in pieces))
 
-    def _between(self, start: int, end: int, *, farthest_m: float = FARTHEST_M) -> list[np.ndarray]:
+    def _between(self, start: int, end: int, *, farthest_m: float = FARTHEST_M) -> list[_Piece]:
         order = itertools.count()
-        heap: list[tuple[float, int, int, list[np.ndarray]]] = [(0.0, next(order), start, [])]
+        heap: list[tuple[float, int, int, list[_Piece]]] = [(0.0, next(order), start, [])]
         seen: set[int] = set()
         while heap:
             at_m, _, node, lines = heapq.heappop(heap)

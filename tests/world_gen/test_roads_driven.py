@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from foretwin.world_gen.roads.build_graph import build_road_graph
-from tests.world_gen.drawn_maps import CROSS, drawn_map, world_of
+from tests.world_gen.drawn_maps import CROSS, drawn_map, roundabout, world_of
 from tests.world_gen.lanes.test_past_driveways import beside
 from tests.world_gen.measure_turns import ALLOWED_RAD, beside_m, turns_of
 from tests.world_gen.roads_driven import RoadsDriven
@@ -53,6 +53,15 @@ def test_roads_lie_where_the_lanes_of_a_world_end() -> None:
         before, behind = roads.lines(start, end)
         assert math.dist(before[0], start.centerline[-1]) < 2.0
         assert math.dist(behind[-1], end.centerline[0]) < 2.0
+
+
+def test_turns_by_a_ring_are_of_a_kind_of_their_own() -> None:
+    kinds = {}
+    for osm in (ASIDE, roundabout()):
+        world = world_of(osm)
+        turns = list(turns_of(world, RoadsDriven(build_road_graph(osm), world.frame)))
+        kinds[osm is ASIDE] = {t.kind for t in turns}
+    assert kinds == {True: {"turn"}, False: {"ring"}}
 
 
 def test_a_road_that_goes_on_past_driveways_is_found_whole() -> None:
