@@ -44,18 +44,20 @@ class RoadsDriven:
 
     def __init__(self, graph: RoadGraph, frame: LocalFrame) -> None:
         """Index the edges, in a World's frame, by their way and nodes, and by where they end."""
-        self._by_name: dict[tuple[int, int, int], _Piece] = {}
+        self._by_name: dict[tuple[int, int, int], list[_Piece]] = {}
         self._onward: dict[int, list[tuple[int, _Piece, float]]] = {}
         origin = graph.frame.origin
         moved_m = local_from_geo(frame, np.array([origin.lat_deg]), np.array([origin.lon_deg]))
         for edge in graph.edges:
             line, ring = edge.xy_m + moved_m, edge.tags.get("junction") in _RINGS
-            for a, b, xy_m in (
-                (edge.start_node, edge.end_node, line),
-                (edge.end_node, edge.start_node, line[::-1]),
+            for a, b, xy_m, allowed in (
+                (edge.start_node, edge.end_node, line, edge.forward),
+                (edge.end_node, edge.start_node, line[::-1], edge.backward),
             ):
-                piece = self._by_name[edge.way_id, a, b] = _Piece(xy_m, ring)
-                self._onward.setdefault(a, []).append((b, piece, edge.length_m))
+                if allowed and edge.car:
+                    piece = _Piece(xy_m, ring)
+                    self._by_name.setdefault((edge.way_id, a, b), []).append(piece)
+                    self._onward.setdefault(a, []).append((b, piece, edge.length_m))
 
     def lines(self, start: Lane, end: Lane) -> list[np.ndarray]:
         """Return the roads (N, 2) from the end of one lane to another, piece by piece.
@@ -85,13 +87,25 @@ class RoadsDriven:
         way, start, end, side = lane.id.split(".")
         nodes = int(start), int(end)
         a, b = nodes if side[0] == "f" else nodes[::-1]
-        piece = self._by_name.get((int(way[1:]), a, b))
-        # Past driveways a World's road is of several edges.
-        pieces = self._between(a, b, farthest_m=math.inf) if piece is None else [piece]
+        beside = shapely.LineString(lane.centerline)
+        named = self._by_name.get((int(way[1:]), a, b), [])
+        # A way may lead from node to node twice.
+        pieces = sorted(named, key=lambda one: _aside_m(one, beside))[:1]
+        if not pieces:  # past driveways a World's road is of several edges
+            pieces = self._between(a, b, farthest_m=math.inf, beside=beside)
         line = np.concatenate([one.xy_m for one in pieces])
         return _Along(a, b, line, any(one.ring for one in pieces))
 
-    def _between(self, start: int, end: int, *, farthest_m: float = FARTHEST_M) -> list[_Piece]:
+    def _between(
+        self,
+        start: int,
+        end: int,
+        *,
+        farthest_m: float = FARTHEST_M,
+        beside: shapely.LineString | None = None,
+    ) -> list[_Piece]:
+        """Return the shortest way from node to node; the farther its roads are from the line
+        `beside`, the longer they count."""
         order = itertools.count()
         heap: list[tuple[float, int, int, list[_Piece]]] = [(0.0, next(order), start, [])]
         seen: set[int] = set()
@@ -102,10 +116,18 @@ class RoadsDriven:
             if node in seen or at_m > farthest_m:
                 continue
             seen.add(node)
-            for other, line, length_m in self._onward.get(node, ()):
+            for other, piece, length_m in self._onward.get(node, ()):
                 if other not in seen:
-                    heapq.heappush(heap, (at_m + length_m, next(order), other, [*lines, line]))
+                    aside_m = 0.0 if beside is None else _aside_m(piece, beside)
+                    to_m = at_m + length_m * (1.0 + aside_m)
+                    heapq.heappush(heap, (to_m, next(order), other, [*lines, piece]))
         return []
+
+
+def _aside_m(piece: _Piece, line: shapely.LineString) -> float:
+    """Return how far the middle of a piece of road lies beside a line."""
+    middle = shapely.LineString(piece.xy_m).interpolate(0.5, normalized=True)
+    return float(middle.distance(line))
 
 
 def _left_of_it(xy_m: np.ndarray, at: np.ndarray, *, behind: bool) -> np.ndarray:
