@@ -69,9 +69,10 @@ class Orchestrator:
         self._interruption = Interruption()
         self._watch = ProcessWatch(processes)
         self._meter = CpuMeter(plan.processes_dir, ORCHESTRATOR)
-        self._failed_at_end = self._refused = False
+        self._failed_at_end = self._refused = self._over = False
         self._before = read_standing(life.standing)
         self._standing: HandingOver
+        self._loop: LiveLoop | None = None
         self._mission = Mission(
             plan.way_ahead(),
             MissionSettings(
@@ -88,6 +89,14 @@ class Orchestrator:
         Returns the exit code. Raises CrashError where the drive goes on without this one, and what
         ended the drive where that is an error.
         """
+        try:
+            return self._run()
+        except Exception as error:
+            if self._over or not self._may_be_followed(error):
+                raise
+            raise CrashError(str(error)) from error
+
+    def _run(self) -> int:
         plan = self._plan
         with join_bus(plan) as bus:
             tables = ResultTables(
@@ -105,21 +114,22 @@ class Orchestrator:
                     self._refused = isinstance(error, UserError)  # its one line says all
                     if self._may_be_followed(error):
                         self._leave_to_next(conductor)
-                        raise CrashError(str(error)) from error
-                    self._end(bus, conductor, line, exit_word)
+                    else:
+                        self._end(bus, conductor, line, exit_word)
                     raise
                 whole = self._end(bus, conductor, line, exit_word)
         return EXIT_FAILED if self._failed_at_end else exit_code(exit_word, whole=whole)
 
     def _may_be_followed(self, error: Exception) -> bool:
-        """Whether another orchestrator may do better; what is true for each ends the drive."""
+        """Whether another one may do better, also than one that follows another and had no memory
+        to begin with; what is true for each ends the drive."""
         told = isinstance(error, (DriveError, LockStepError))
-        return not (told or self._life.last or self._standing.loop is None) and (
-            self._processes.start_again
-        )
+        begun = self._loop is not None or self._before is not None
+        return begun and not (told or self._life.last) and self._processes.start_again
 
     def _leave_to_next(self, conductor: Conductor) -> None:
-        self._standing.all()
+        if self._loop is not None:  # else it may not yet stand where the one before it did
+            self._standing.all()
         conductor.route.close()
         conductor.beside.close()
         conductor.tables.leave()
@@ -181,7 +191,7 @@ class Orchestrator:
                 say_in_charge()
                 self._standing.news()
 
-            loop = self._standing.loop = LiveLoop(
+            loop = self._loop = self._standing.loop = LiveLoop(
                 conductor,
                 housekeeping=housekeeping,
                 stop=self._stop,
@@ -250,7 +260,7 @@ class Orchestrator:
         exit_word: str,
     ) -> bool:
         """End everything and say how it went; returns whether nothing of the run is lost."""
-        plan = self._plan
+        plan, self._over = self._plan, True
         self._standing.all(exit_word=exit_word)
         self._meter.write()  # what follows is no part of the drive
         end = RunEnd(stamp_ns=conductor.intake.now_stamp_ns)

@@ -155,6 +155,47 @@ def test_at_20_random_instants_it_comes_back_in_5_s(tmp_path: Path) -> None:
     print(f"first new round: median {statistics.median(back_s):.2f} s, worst {max(back_s):.2f} s")
 
 
+FAILS_TO_BEGIN_ONCE = """
+import sys
+from pathlib import Path
+from foretwin.orchestrator.drive.conductor import Conductor
+from foretwin.__main__ import main
+
+join, lives = Conductor.join, Path(sys.argv[sys.argv.index("--out") + 1]) / "lives"
+
+def joined(conductor):
+    with lives.open("a") as file:
+        file.write("x")
+    if len(lives.read_text()) == 2:
+        raise RuntimeError("can't start new thread")
+    join(conductor)
+
+Conductor.join = joined
+sys.exit(main())
+"""
+
+
+def test_one_that_follows_and_cannot_begin_is_followed_by_another(tmp_path: Path) -> None:
+    out = tmp_path / "runs"
+    out.mkdir()
+    with started(out, *LIVE, entry=("-c", FAILS_TO_BEGIN_ONCE)) as process:
+        run = begun(out)
+        wait_for(lambda: rows_so_far(run, "rounds") > 0, "a round")
+        before = rows_so_far(run, "rounds")
+        os.kill(orchestrator_pid(run), signal.SIGKILL)
+        wait_for(lambda: says(run, "goes on at round"), "the third orchestrator")
+        wait_for(lambda: rows_so_far(run, "rounds") > before, "a new round")
+        process.send_signal(signal.SIGINT)
+        screen, _ = process.communicate(timeout=ENDS_WITHIN_S)
+    done = Finished(process.returncode, screen, run)
+
+    assert done.code == 130, screen
+    assert (done.record()["exit"], done.record()["orchestrator"]["restarts"]) == ("interrupted", 2)
+    assert "the orchestrator ended by an error of its own; this is another one" in screen
+    numbers = [row["round_id"] for row in done.rows("rounds")]
+    assert len(numbers) == len(set(numbers)) > before
+
+
 def test_in_lock_step_a_kill_changes_no_bit(tmp_path: Path) -> None:
     whole = foretwin(tmp_path / "whole", *SMALL)
     out = tmp_path / "killed"
