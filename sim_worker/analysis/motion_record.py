@@ -34,7 +34,7 @@ class MotionRecord(NamedTuple):
 
     Positions are those of the antenna in the given local frame; the yaw rate and the specific
     force ahead are the body's; steering as measured (wheel, tyre) and as commanded, positive to the
-    left. `manual` says where a human drives.
+    left. `command_age_s` is how long the commands have held, `manual` where a human drives.
     """
 
     stamp_ns: Stamps
@@ -50,6 +50,7 @@ class MotionRecord(NamedTuple):
     command_accel_mps2: Array
     command_wheel_rad: Array
     command_tire_rad: Array
+    command_age_s: Array
     manual: Flags
 
     @property
@@ -170,6 +171,8 @@ class MotionRecorder:
                     known[:, index] = np.unwrap(known[:, index])
                 read = _held if channel in _HELD else between_samples
                 columns[name] = read(known[:, 0], known[:, index], at, gap_s=_GAP_S[channel])
+        commands = self._table("control", 4)[:, 0]
+        columns["command_age_s"] = at - _held(commands, commands, at, gap_s=_GAP_S["control"])
         told = self._table("status", 2)
         manual = _held(told[:, 0], told[:, 1], at, gap_s=np.inf)
         return MotionRecord(stamp_ns=stamps, manual=manual == 1.0, **columns)

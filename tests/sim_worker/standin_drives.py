@@ -81,6 +81,7 @@ def straight_minute(*, speed_mps: float = 33.0, seed: int = 0) -> MotionRecord:
         command_accel_mps2=(pedal + drag) / car.drive_gain,
         command_wheel_rad=wheel,
         command_tire_rad=absent,
+        command_age_s=np.zeros(count),
         manual=np.zeros(count, dtype=np.bool_),
     )
 

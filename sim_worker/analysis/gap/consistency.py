@@ -15,6 +15,8 @@ from foretwin.sim_worker.analysis.gap.fitting import (
     DelayedLine,
     Line,
     delayed_line,
+    joint_fit,
+    late_line,
     line_through,
 )
 from foretwin.sim_worker.analysis.gap.free_run import MIN_TURN_RAD
@@ -27,6 +29,8 @@ _LEAST_SWING_PM, _LONGEST_LAG_S = 0.02, 0.4
 _LEAST_STOP_S = 0.3
 _SPEEDS_TOGETHER_S = 0.4
 """For so long, speeds and courses from positions err alike."""
+_POSITIONS_LATE_S = 0.1
+"""How late positions may be stamped (standard deviation): receivers take up to 0.2 s."""
 _LEAST_TURN_RADPS = 0.03
 """Positions that are good to 2 cm tell the rate of a course to 0.006 rad/s: how a car weaves on a
 straight is less, and says nothing of its gyro's gain."""
@@ -139,30 +143,42 @@ def _turning(model: Array, real: Array) -> Line | None:
 
 
 def _turn_rates(pairs: SignalPairs) -> Line | None:
-    """Fit how the gyro goes with the course's rate; without a bend its bias alone."""
-    course, gyro = pairs.course_radps[::_EVERY], pairs.gyro_radps[::_EVERY]
-    known = np.isfinite(course) & np.isfinite(gyro)
-    course, gyro = course[known], gyro[known]
+    """Fit how the gyro goes with the course's rate; without a bend its bias alone.
+
+    Positions may be stamped late: on the way into a bend that looks like a bias.
+    """
+    changes = np.gradient(pairs.gyro_radps) / PERIOD_S
+    signals = (pairs.course_radps, pairs.gyro_radps, changes, pairs.ground_mps)
+    columns = np.stack([one[::_EVERY] for one in signals])
+    course, gyro, changes, ground_mps = columns[:, np.isfinite(columns).all(axis=0)]
     seconds = len(course) * _EVERY * PERIOD_S
     if seconds < 1.2:
         return None
     independent = max(seconds / _SPEEDS_TOGETHER_S, 2.0)
     # The course is by far the noisier: over it the gyro's gain would come out too small.
     bends = float(np.ptp(gyro)) > _LEAST_TURN_RADPS
-    line = line_through(gyro, course, independent=independent) if bends else None
+    line = None
+    if bends:
+        line = late_line(
+            gyro, course, changes, independent=independent, late_std_s=_POSITIONS_LATE_S
+        )
     if line is not None and abs(line.gain) > 5.0 * line.gain_std:
         gain = 1.0 / line.gain
         gain_std, offset_std = line.gain_std * gain**2, line.offset_std * abs(gain)
         offset = -line.offset * gain
         return line._replace(gain=gain, gain_std=gain_std, offset=offset, offset_std=offset_std)
     # The slower the car, the less its positions say of its course.
-    weight = pairs.ground_mps[::_EVERY][known] ** 2
-    weight /= np.sum(weight)
-    apart = gyro - course
-    offset = float(np.sum(weight * apart))
-    std = float(np.sqrt(np.sum(weight * (apart - offset) ** 2)))
+    weight = ground_mps**2 / np.sum(ground_mps**2)
     heard = independent / (len(weight) * float(np.sum(weight**2)))
-    return Line(1.0, np.inf, offset, std / np.sqrt(heard), std, 0.0)
+    apart = gyro - course
+    std = float(np.sqrt(np.sum(weight * (apart - np.sum(weight * apart)) ** 2)))
+    late = joint_fit(
+        apart,
+        np.stack([np.ones(len(apart)), changes], axis=1),
+        variance=max(std, 1e-9) ** 2 / (heard * np.maximum(weight, 1e-12)),
+        prior_std=np.array([np.inf, _POSITIONS_LATE_S]),
+    )
+    return Line(1.0, np.inf, float(late.sizes[0]), float(late.std[0]), std, 0.0)
 
 
 def _missing(pairs: SignalPairs) -> float:

@@ -64,6 +64,24 @@ def line_through(x: Array, y: Array, *, independent: float) -> Line | None:
     )
 
 
+def late_line(
+    x: Array, y: Array, changes: Array, *, independent: float, late_std_s: float
+) -> Line | None:
+    """Fit as `line_through`, where y may come late by 0 give or take `late_std_s`.
+
+    `changes` (N,) are those of x in a second. What time explains, neither gain nor offset need to.
+    """
+    line = line_through(x, y, independent=independent)
+    if line is None:
+        return None
+    columns = np.stack([x, np.ones(len(x)), -changes], axis=1)
+    prior_std = np.array([np.inf, np.inf, late_std_s * max(abs(line.gain), 0.3)])
+    each = max(line.residual, 1e-9) ** 2 * len(x) / independent
+    fit = joint_fit(y, columns, variance=np.full(len(x), each), prior_std=prior_std)
+    (gain, offset, _), (gain_std, offset_std, _) = fit.sizes.tolist(), fit.std.tolist()
+    return line._replace(gain=gain, gain_std=gain_std, offset=offset, offset_std=offset_std)
+
+
 def delayed_line(x: Array, y: Array, *, longest_s: float = 0.8) -> DelayedLine | None:
     """Fit how y follows x, both (N,) on the grid, with delays from 0 to `longest_s`.
 

@@ -12,13 +12,16 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from foretwin.contracts.arrays import Array, Flags, Indices, Stamps
+from foretwin.sim_worker.analysis.gap.between_commands import SELDOM_S, between_commands
 from foretwin.sim_worker.analysis.gap.free_run import (
+    AT_MOST,
     MIN_TURN_RAD,
     FreeRunner,
     RunMemory,
     outrun,
     start_states,
     tire_angles,
+    turns_radps,
 )
 from foretwin.sim_worker.analysis.gap.measured_motion import MeasuredMotion
 from foretwin.sim_worker.analysis.gap.push_blocks import BLOCK, PushBlocks, push_blocks
@@ -34,6 +37,8 @@ _SETTLED = round(0.4 / PERIOD_S)
 _SMOOTH_HALF, _COURSE_HALF, _TURN_HALF = 3, round(0.3 / PERIOD_S), round(0.24 / PERIOD_S)
 MOVES_MPS, _ROLLS_MPS = 2.5, 0.5
 """Above them turning, and acceleration and speed alone, say something."""
+_CATCHES_UP = round(0.4 / PERIOD_S)
+"""So long tyres take to where they are commanded to once they turn less fast."""
 _FULL_LOCK_RAD = 0.36
 """Sharper, on less than 7 m, tyres scrub and steering runs out of its line: no model is right, and
 what departs there accuses nobody. Chosen: a car of 2.4 m/s at 0.5 rad lost all of 0.6 m/s²."""
@@ -75,10 +80,15 @@ class SignalPairs(NamedTuple):
     pushes: PushBlocks
     too_fast: Flags
     """Tyres that turn as fast as the vehicle's can are not yet where they are commanded to."""
+    rare: Flags
+    """Between two commands others may have been sent."""
 
     @property
     def broken(self) -> bool:
-        """Whether steering is lost somewhere since it was first known, the car not standing."""
+        """Whether steering is lost somewhere since it was first known, the car not standing, or
+        what it was told is known now and then alone."""
+        if self.rare.any():
+            return True
         known = np.isfinite(self.asked_rad) & np.isfinite(self.done_rad)
         lost = ~known & ~(self.speed_mps < MOVES_MPS)
         return bool(lost[int(np.argmax(known)) :].any()) if known.any() else False
@@ -112,6 +122,12 @@ def pairs_of(
     ratio = runner.vehicle.steering_ratio.value
     asked = record.command_wheel_rad / ratio if wheel else signals.commanded_rad
     done = record.wheel_rad / ratio if wheel else signals.measured_rad
+    between = between_commands(record.command_age_s)
+    asked, commanded = (between.of(one) for one in (asked, signals.commanded_rad))
+    fastest_radps = runner.vehicle.max_tire_rate_radps.value
+    # What was sent between may have been ahead of tyres that turn as fast as they can.
+    hurries = between.rare & (turns_radps(done) > AT_MOST * fastest_radps)
+    hurries = np.convolve(hurries, np.ones(_CATCHES_UP))[: len(hurries)] > 0.0
     arc = np.arctan(runner.vehicle.wheelbase_m.value * rate / np.maximum(speed, MOVES_MPS))
     sharp = np.abs(arc) > _FULL_LOCK_RAD
     sensors: dict[str, Any] = dict.fromkeys(_SENSORS, np.full(len(speed), np.nan))
@@ -126,8 +142,9 @@ def pairs_of(
         arc_rad=np.where(moves, arc, np.nan),
         speed_mps=speed,
         curvature_pm=np.where(moves & ~sharp, rate / np.maximum(speed, MOVES_MPS), np.nan),
-        commanded_rad=signals.commanded_rad,
-        too_fast=outrun(asked, done, fastest_radps=runner.vehicle.max_tire_rate_radps.value),
+        commanded_rad=commanded,
+        too_fast=outrun(asked, done, fastest_radps=fastest_radps) | hurries,
+        rare=between.rare,
         **sensors,
         **_runs(record, runner, memory or RunMemory(), sharp),
     )
@@ -182,7 +199,9 @@ def _runs(
 
     Runs overlap so that their ends tile the stretch, back from its own end.
     """
-    speed, rate, accel = record.speed_mps, record.yaw_rate_radps, record.command_accel_mps2
+    speed, rate = record.speed_mps, record.yaw_rate_radps
+    known = record.command_age_s <= SELDOM_S
+    accel = np.where(known, record.command_accel_mps2, np.nan)
     signals = tire_angles(record, runner.vehicle)
     count = len(speed)
     eased = smooth(speed, _SMOOTH_HALF)

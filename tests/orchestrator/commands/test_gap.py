@@ -138,6 +138,16 @@ def test_a_car_driven_by_hand_is_followed_at_its_measured_steering_and_speed(
         assert word not in said
 
 
+def test_a_gyro_that_is_off_is_told_in_json(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    drive = drive_of(SEED, "offset_gyro", end_s=8.0)
+    file = written(tmp_path / "gyro.mcap", drive.info, drive.samples)
+    assert run(["gap", str(file), "--json"]) == 0
+    (verdict,) = json.loads(capsys.readouterr().out)["verdicts"]
+    assert (verdict["cause"], verdict["evidence"][0]["name"]) == ("gyro_sensor", "gyro_offset")
+
+
 def test_dirt_is_counted_said_and_survived(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

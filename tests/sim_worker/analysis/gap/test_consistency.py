@@ -48,6 +48,7 @@ def turning(
         model_tire_rad=shifted(asked_rad, 0.1) if model_rad is None else model_rad,
         pushes=PushBlocks(*np.zeros((6, 0))),
         too_fast=np.zeros(len(TIME_S), dtype=np.bool_),
+        rare=np.zeros(len(TIME_S), dtype=np.bool_),
     )
 
 

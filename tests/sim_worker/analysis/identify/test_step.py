@@ -74,6 +74,7 @@ def driven(
         command_accel_mps2=np.full(count, accel_mps2),
         command_wheel_rad=wheel,
         command_tire_rad=absent,
+        command_age_s=np.zeros(count),
         manual=np.zeros(count, dtype=np.bool_),
     )
 
