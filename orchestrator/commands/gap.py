@@ -21,6 +21,7 @@ from foretwin.orchestrator.commands.compare_text import after_lines
 from foretwin.orchestrator.commands.gap_text import (
     WIDTH,
     DrivenBy,
+    moved_lines,
     not_held_lines,
     table_lines,
     turning_lines,
@@ -32,7 +33,12 @@ from foretwin.orchestrator.commands.progress_bar import progress_bar
 from foretwin.orchestrator.commands.told import CommandResult
 from foretwin.orchestrator.drive.telemetry_watch import estimate_line, estimate_object
 from foretwin.orchestrator.record.run_state import check_finished
-from foretwin.sim_worker.analysis.gap.clock_offsets import on_one_clock
+from foretwin.sim_worker.analysis.gap.clock_offsets import (
+    ClockOffset,
+    apart_from_commands,
+    moved_s,
+    on_one_clock,
+)
 from foretwin.sim_worker.analysis.gap.errors import GapLimits, GapMeter, GapRow, gap_table
 from foretwin.sim_worker.analysis.gap.free_run import FreeRunner
 from foretwin.sim_worker.analysis.gap.measured_motion import LONGEST_GAP_S, motion_on_grid
@@ -61,6 +67,8 @@ class GapReport(NamedTuple):
     turning: TurningGap | NotHeld
     """The model driven by measured steering and speed, or why these are not enough."""
     driven_by: DrivenBy
+    moved_s: dict[str, float]
+    """By how much samples of which channels were stamped late, and are judged earlier."""
     refused: dict[str, int]
     """Samples that the reader refused, by reason."""
     estimate: StateConsistency
@@ -116,10 +124,14 @@ def _measured(
     found = turning_gap(record, vehicle)
     turning = found if isinstance(found, TurningGap) else None
     by_hand = turning is not None and not np.isfinite(record.command_accel_mps2).any()
-    if turning is not None and by_hand:
-        # States and pairs of signals that are compared must not be of different times.
-        clocks = {"steering": turning.steering_clock, "speed": turning.speed_clock}
-        messages = on_one_clock(messages, clocks)
+    clocks: dict[str, ClockOffset | None] = {}
+    if turning is not None:
+        steering, speed = turning.steering_clock, turning.speed_clock
+        clocks = {"steering": steering, "speed": speed}
+        if not by_hand:  # how late steering is may be the model's fault: that is judged below
+            clocks = apart_from_commands(steering, speed=speed, gnss=turning.position_clock)
+    # States and pairs of signals that are compared must not be of different times.
+    messages = on_one_clock(messages, clocks) if clocks else messages
     states: list[VehicleState] = []
     verdicts: list[Verdict] = []
     next_ns: int | None = None
@@ -155,6 +167,7 @@ def _measured(
         undecided=turning.departure if turning is not None and by_hand else detector.undecided,
         turning=found,
         driven_by=driven_by,
+        moved_s=moved_s(clocks),
         refused=refused,
         estimate=estimator.consistency,
     )
@@ -210,6 +223,7 @@ def as_object(report: GapReport) -> dict[str, Any]:
         "rows": [row._asdict() for row in report.rows],
         "reason": why_undecided(report.verdicts, report.undecided, driven_by=report.driven_by),
         "turning": None if isinstance(turning, NotHeld) else turning_object(turning),
+        "moved_s": report.moved_s,
         "turning_not_held": turning.why if isinstance(turning, NotHeld) else None,
         "verdicts": [msgspec.to_builtins(verdict) for verdict in report.verdicts],
         "alarms": [msgspec.to_builtins(alarm) for alarm in report.alarms],
@@ -228,6 +242,7 @@ def _lines(report: GapReport) -> list[str]:
         lines += turning_lines(report.turning)
     elif report.driven_by == "estimated commands":
         lines += [*not_held_lines(report.turning), ""]
+    lines += moved_lines(report.moved_s)
     reason = why_undecided(report.verdicts, report.undecided, driven_by=report.driven_by)
     start_ns = report.info.start_stamp_ns
     return lines + list(verdict_lines(report.verdicts, report.alarms, reason, start_ns=start_ns))

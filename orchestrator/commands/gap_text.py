@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import textwrap
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, Literal
 
 import numpy as np
@@ -115,6 +115,14 @@ _CONDITION = (
 def not_held_lines(turning: NotHeld) -> list[str]:
     """Return why the model was not driven by what was measured."""
     return _wrapped(f"the model was not driven by what was measured: {turning.why}", indent="  ")
+
+
+def moved_lines(moved_s: Mapping[str, float]) -> list[str]:
+    """Return which samples are judged as of another time than they are stamped."""
+    if not moved_s:
+        return []
+    each = ", ".join(f"{name} by {1e3 * late_s:+z.0f} ms" for name, late_s in moved_s.items())
+    return [*_wrapped(f"stamped late, and judged without that: {each}", indent="  "), ""]
 
 
 def turning_lines(turning: TurningGap) -> list[str]:

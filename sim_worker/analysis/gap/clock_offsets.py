@@ -30,6 +30,8 @@ deviation of what is anywhere in a tick)."""
 _PITCH_S = 0.015
 """A body that pitches as it is braked shows the unit a share of gravity, later: with the stand-in,
 speeds look 25 ms early for it."""
+_TAKEN_S = 0.1
+"""Clocks so far apart accuse nobody: nothing needs to be moved for them."""
 _GAIN_STD = 0.3
 """How far what a sensor shows may be off in size, while only its time is sought."""
 
@@ -51,11 +53,7 @@ def on_one_clock(
 
     `offsets` are by channel. One within 1.96 of its standard deviations of 0 is let be.
     """
-    late_ns = {
-        channel: round(offset.late_s * 1e9)
-        for channel, offset in offsets.items()
-        if offset is not None and abs(offset.late_s) > _SURE * offset.std_s
-    }
+    late_ns = {channel: round(late_s * 1e9) for channel, late_s in moved_s(offsets).items()}
     moved = [
         (channel, replace(message, stamp_ns=message.stamp_ns - late_ns[channel]))
         if channel in late_ns
@@ -63,6 +61,41 @@ def on_one_clock(
         for channel, message in samples
     ]
     return sorted(moved, key=lambda one: one[1].stamp_ns)
+
+
+def moved_s(offsets: Mapping[str, ClockOffset | None]) -> dict[str, float]:
+    """Return by how much `on_one_clock` moves which channels."""
+    return {
+        channel: offset.late_s
+        for channel, offset in offsets.items()
+        if offset is not None and abs(offset.late_s) > _SURE * offset.std_s
+    }
+
+
+def apart_from_commands(
+    steering: ClockOffset, *, speed: ClockOffset | None, gnss: ClockOffset | None
+) -> dict[str, ClockOffset | None]:
+    """Return by how much channels of a commanded car are stamped later than its commands, of those
+    that surely are so by more than verdicts take in their stride.
+
+    All are given as later than the inertial unit. It is the one that is late where steering and
+    speed agree on that; how late steering alone is may as well be how the model turns.
+    """
+    unit_s = 0.0
+    if speed is not None and _is_far(steering) and _is_far(speed):
+        unit_s = -speed.late_s if abs(speed.late_s - steering.late_s) < _TAKEN_S else 0.0
+    std_s = 0.0 if speed is None else speed.std_s
+    late = {"speed": speed, "gnss": gnss}
+    moved = {
+        name: None if one is None else one._replace(late_s=one.late_s + unit_s)
+        for name, one in late.items()
+    }
+    found = {**moved, "imu": ClockOffset(unit_s, std_s)}
+    return {name: one for name, one in found.items() if one is not None and _is_far(one)}
+
+
+def _is_far(offset: ClockOffset) -> bool:
+    return abs(offset.late_s) - _SURE * offset.std_s > _TAKEN_S
 
 
 def on_tick(column: Array, shift_s: float) -> Array:

@@ -26,9 +26,12 @@ from foretwin.sim_worker.analysis.motion_record import PERIOD_S
 _MIN_CURVATURE_PM = 0.006
 _HARD_MPS2 = 1.2
 _LEAST_SWING_PM, _LONGEST_LAG_S = 0.02, 0.4
+_GAIN_OF_A_LAG = 0.4
+"""Who turns late and by another share than this off does not only turn late. Chosen."""
 _LEAST_STOP_S = 0.3
 _SPEEDS_TOGETHER_S = 0.4
 """For so long, speeds and courses from positions err alike."""
+_CLOCKS_APART_S = 0.16
 _POSITIONS_LATE_S = 0.1
 """How late positions may be stamped (standard deviation): receivers take up to 0.2 s."""
 _LEAST_TURN_RADPS = 0.03
@@ -182,12 +185,24 @@ def _turn_rates(pairs: SignalPairs) -> Line | None:
 
 
 def _missing(pairs: SignalPairs) -> float:
-    """Return the RMS of the lateral acceleration between model and car in bends, NaN in none."""
-    apart = (pairs.curvature_pm - pairs.by_measured_pm) * pairs.speed_mps**2
-    apart = apart[pairs.excited & np.isfinite(apart)]
-    if len(apart) * PERIOD_S < 0.6:
+    """Return the RMS of the lateral acceleration between model and car in bends, NaN in none.
+
+    It is that of clocks up to 0.2 s apart with which they agree best.
+    """
+    real, model = (
+        np.where(pairs.excited, one, np.nan) * pairs.speed_mps**2
+        for one in (pairs.curvature_pm, pairs.by_measured_pm)
+    )
+    most, count = round(_CLOCKS_APART_S / PERIOD_S), len(real)
+    if count <= 2 * most:
         return float("nan")
-    return float(np.sqrt(np.mean(apart * apart)))
+    inner = slice(most, count - most)
+    late = np.lib.stride_tricks.sliding_window_view(model, count - 2 * most)[::2]
+    apart = late - real[inner]
+    known = np.isfinite(apart).all(axis=0)
+    if known.sum() * PERIOD_S < 0.6:
+        return float("nan")
+    return float(np.sqrt(np.min(np.mean(apart[:, known] ** 2, axis=1))))
 
 
 def _mean_ratio(x: Array, y: Array, *, period_s: float, least_s: float) -> Line | None:
@@ -221,7 +236,9 @@ def _lag(model: Array, real: Array) -> Lag | None:
     tells = abs(pair.line.gain) * changes.residual * np.sqrt(known.sum() * PERIOD_S / TOGETHER_S)
     std_s = pair.line.residual / max(float(tells), 1e-9)
     helps = pair.line.residual**2 < 0.5 * at_once.residual**2
-    return Lag(pair.delay_s if helps else 0.0, std_s)
+    # Into a bend that goes on, any lag fits with a gain and an offset that make up for it.
+    alike = abs(pair.line.gain - 1.0) < _GAIN_OF_A_LAG
+    return Lag(pair.delay_s if helps and alike else 0.0, std_s)
 
 
 _SHARE = 0.25

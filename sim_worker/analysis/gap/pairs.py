@@ -44,8 +44,8 @@ _FULL_LOCK_RAD = 0.36
 what departs there accuses nobody. Chosen: a car of 2.4 m/s at 0.5 rad lost all of 0.6 m/s²."""
 _MOST_ACROSS_MPS2 = 15.0
 """No tyre of the road carries more: from a gyro that says so no model can begin."""
-FASTEST_MPS = 80.0
-"""No car's: positions that leap say nothing of its sensors."""
+FASTEST_MPS, _HARDEST_MPS2 = 80.0, 15.0
+"""No car's, twice what tyres do: positions that leap say nothing of its sensors."""
 
 
 class SignalPairs(NamedTuple):
@@ -175,7 +175,8 @@ def _sensors(record: MotionRecord, ahead_m: float) -> dict[str, Any]:
     half = _COURSE_HALF
     dx, dy = _change(record.x_m, half), _change(record.y_m, half)
     gone = np.hypot(dx, dy) / (2 * half * PERIOD_S)
-    leapt = gone > FASTEST_MPS
+    surges = np.abs(np.gradient(gone)) / PERIOD_S > _HARDEST_MPS2
+    leapt = (gone > FASTEST_MPS) | (np.convolve(surges, np.ones(4 * half + 1), "same") > 0.0)
     dx[leapt], gone[leapt] = np.nan, np.nan
     drives = gone > MOVES_MPS
     rate = np.where(drives, record.yaw_rate_radps, np.nan)

@@ -14,11 +14,12 @@ from foretwin.contracts.frames import GeoPoint
 from foretwin.orchestrator.commands import gap
 from foretwin.orchestrator.commands.cli import run
 from foretwin.orchestrator.commands.gap import gap_of
+from foretwin.orchestrator.commands.gap_text import moved_lines
 from foretwin.telemetry.logs.write_mcap import create
 from foretwin.telemetry.ros_messages.table import messages_from
 from tests.sim_worker.analysis.gap.measured_figures import Lateness, hand_driven
 from tests.sim_worker.analysis.gap.test_verdict import END_S, SEED
-from tests.sim_worker.faulty_standin import drive_of
+from tests.sim_worker.faulty_standin import drive_of, said_as
 from tests.telemetry.standin_drive import FRAME
 
 COVERS = (
@@ -138,13 +139,27 @@ def test_a_car_driven_by_hand_is_followed_at_its_measured_steering_and_speed(
         assert word not in said
 
 
+def test_a_speed_half_a_second_late_accuses_nobody_and_is_told(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    late = said_as(SpeedSample, lambda m: {"stamp_ns": m.stamp_ns + 500_000_000})
+    drive = drive_of(BY_HAND, end_s=60.0).with_fault(late)
+    file = written(tmp_path / "late.mcap", drive.info, drive.samples)
+    assert run(["gap", str(file), "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert (told["driven_by"], told["verdicts"]) == ("commands", [])
+    assert told["moved_s"] == {"speed": pytest.approx(0.48, abs=0.03)}
+    (line, _) = moved_lines(told["moved_s"])
+    assert line.strip().startswith("stamped late, and judged without that: speed by +")
+
+
 def test_a_gyro_that_is_off_is_told_in_json(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     drive = drive_of(SEED, "offset_gyro", end_s=8.0)
     file = written(tmp_path / "gyro.mcap", drive.info, drive.samples)
     assert run(["gap", str(file), "--json"]) == 0
-    (verdict,) = json.loads(capsys.readouterr().out)["verdicts"]
+    (verdict, *_) = json.loads(capsys.readouterr().out)["verdicts"]
     assert (verdict["cause"], verdict["evidence"][0]["name"]) == ("gyro_sensor", "gyro_offset")
 
 

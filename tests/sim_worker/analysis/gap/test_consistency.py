@@ -184,3 +184,22 @@ def test_a_stretch_is_broken_where_steering_was_lost_but_not_where_the_car_stood
 
 def _found(pairs: SignalPairs) -> Finding | None:
     return findings_of(consistency_of(pairs))
+
+
+def test_a_gyro_that_is_late_leaves_no_lateral_acceleration_missing() -> None:
+    model = 0.06 * np.sin(3.0 * TIME_S)
+    late, beside = shifted(model, 0.14), model[::-1] * np.abs(np.sin(TIME_S))
+    assert consistency_of(turning(real_pm=model, model_pm=model)).missing_mps2 == 0.0
+    assert consistency_of(turning(real_pm=late, model_pm=model)).missing_mps2 < 0.1
+    assert consistency_of(turning(real_pm=beside, model_pm=model)).missing_mps2 > 0.5
+
+
+def test_a_lag_with_another_gain_is_none() -> None:
+    """Into a bend that goes on: the model follows at once, and turns a little less."""
+    real = 0.07 / (1.0 + np.exp(-3.0 * (TIME_S - 3.5))) + 0.002 * TIME_S
+    model = 0.065 / (1.0 + np.exp(-3.5 * (TIME_S - 3.5)))
+    seen = consistency_of(turning(real_pm=real, model_pm=model))
+    late = consistency_of(turning(real_pm=model, model_pm=shifted(model, 0.3)))
+    assert seen.motion_lag is not None
+    assert late.motion_lag is not None
+    assert (seen.motion_lag.seconds, late.motion_lag.seconds) == (0.0, pytest.approx(0.3))

@@ -9,7 +9,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from foretwin.sim_worker.analysis.gap.clock_offsets import ClockOffset, on_one_clock
+from foretwin.sim_worker.analysis.gap.clock_offsets import (
+    ClockOffset,
+    apart_from_commands,
+    on_one_clock,
+)
 from foretwin.sim_worker.analysis.gap.measured_turning import NotHeld, TurningGap
 from tests.sim_worker.analysis.gap.measured_figures import Lateness, hand_driven, turning_of
 from tests.sim_worker.faulty_standin import model_with
@@ -85,6 +89,26 @@ def test_samples_are_put_on_one_clock_where_it_is_told_well_enough() -> None:
     assert of("steering", moved) == [ns - 100_000_000 for ns in of("steering", samples)]
     for channel in ("speed", "imu"):
         assert of(channel, moved) == of(channel, samples)
+
+
+def test_of_a_commanded_car_what_is_far_off_is_moved() -> None:
+    """Steering that alone is apart from the gyro may be how the model turns."""
+    sure = ClockOffset(0.0, 0.01)
+    none = apart_from_commands(sure._replace(late_s=0.3), speed=sure, gnss=sure)
+    assert none == {}
+    near, far, doubtful = (ClockOffset(*one) for one in ((0.11, 0.01), (0.13, 0.01), (0.5, 0.25)))
+    assert apart_from_commands(sure, speed=near, gnss=far) == {"gnss": far}
+    assert apart_from_commands(sure, speed=far, gnss=doubtful) == {"speed": far}
+    assert apart_from_commands(sure, speed=None, gnss=None) == {}
+
+
+def test_where_steering_and_speed_agree_the_inertial_unit_is_late() -> None:
+    early = ClockOffset(-0.3, 0.01)
+    gnss = ClockOffset(0.1, 0.02)
+    moved = apart_from_commands(early, speed=early._replace(late_s=-0.28), gnss=gnss)
+    assert moved == {
+        "imu": ClockOffset(0.28, 0.01), "gnss": ClockOffset(pytest.approx(0.38), 0.02),
+    }  # fmt: skip
 
 
 def test_half_a_minute_is_needed() -> None:

@@ -126,13 +126,6 @@ def test_clocks_apart_accuse_nobody_or_are_named(end_s: float) -> None:
         assert all("stamped by clocks" in one.text for one in told)
 
 
-def test_positions_late_by_150_ms_make_no_bias_of_a_gyro() -> None:
-    late = said_as(GnssFix, lambda m: {"stamp_ns": m.stamp_ns + 150_000_000})
-    drive = drive_of(5, end_s=18.0).with_fault(late)
-    detector = FaultDetector(drive.info, model_with(None), frame=FRAME)
-    assert list(verdicts_on(detector, drive)) == []
-
-
 def test_a_gyro_in_degrees_per_second_is_the_gyros_and_no_models() -> None:
     """No model can begin where a car is said to turn by ten radians a second."""
     told, _ = judged_as(gyro_as(math.degrees(1.0), 0.0))
