@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 
 import msgspec
 
@@ -26,6 +26,12 @@ HALF_OF_95 = 1.96
 MUCH_WIDER = 1.5
 """Times the standard deviation before: what is known so much worse is no news. Chosen."""
 STIFFNESS = "front_cornering_stiffness_npr"
+STEERING = ("steering_ratio", "steering_offset_rad", UNDERSTEER_GRADIENT)
+ALONG = ("drive_gain", "brake_gain", "drag_npv2", "rolling_resistance_n", "accel_delay_s")
+"""What one fit tells, of how the car turns and of how it speeds up and slows down."""
+_TELLING = {"steering_ratio": STEERING, "drive_gain": ALONG, "brake_gain": ALONG}
+"""Where one of these is no vehicle's, the signals are not what they are said to be, and nothing
+that was fitted along with it is right."""
 
 
 def is_acceptable(estimate: ParameterEstimate) -> bool:
@@ -68,40 +74,85 @@ def accepted(
     name. What would make no vehicle (a negative drag), or an implausible one, is passed over.
     """
     changes: list[ParameterChange] = []
-    for estimate in result.estimates:
+    for estimate in judged(result, vehicle).estimates:
         if not is_acceptable(estimate) or estimate.name in pinned:
             continue
-        assert estimate.value is not None
-        name, value, std = estimate.name, estimate.value, std_of(estimate)
-        if name == UNDERSTEER_GRADIENT:
-            if STIFFNESS in pinned:
-                continue
-            try:
-                stiffness = front_stiffness(vehicle, value)
-                softer = front_stiffness(vehicle, value + std)
-            except ValueError:
-                continue
-            name, value, std = STIFFNESS, stiffness, abs(stiffness - softer)
-        before = getattr(vehicle, name).value
-        changed = msgspec.structs.replace(
-            vehicle, **{name: Parameter(value, std, f"{source}, {result.excited_s:.0f} s")}
-        )
-        try:
-            vehicle = check_vehicle(changed, before=vehicle)
-        except ValueError:
+        if estimate.name == UNDERSTEER_GRADIENT and STIFFNESS in pinned:
             continue
+        name, parameter = _parameter(estimate, vehicle)
+        before = getattr(vehicle, name).value
+        parameter = msgspec.structs.replace(parameter, source=f"{source}, {result.excited_s:.0f} s")
+        vehicle = msgspec.structs.replace(vehicle, **{name: parameter})
         changes.append(
             ParameterChange(
                 vehicle_id=result.vehicle_id,
                 stamp_ns=result.stamp_ns,
                 name=name,
                 before=before,
-                value=value,
-                std=std,
+                value=parameter.value,
+                std=parameter.std,
                 origin="identified",
             )
         )
     return vehicle, tuple(changes)
+
+
+def judged(result: Identification, vehicle: VehicleParameters) -> Identification:
+    """Return an identification that says of what would make no vehicle of `vehicle`, or an
+    implausible one, that it does, and what else cannot be right then."""
+    against: dict[str, str] = {}
+    for estimate in result.estimates:
+        if reason := _implausible(estimate, vehicle):
+            for name in _TELLING.get(estimate.name, ()):
+                against.setdefault(name, f"it was told along with {estimate.name}, which is wrong")
+            against[estimate.name] = reason
+    return _with_reasons(result, against)
+
+
+def _with_reasons(result: Identification, against: Mapping[str, str]) -> Identification:
+    """Return an identification that has these reasons, by name, against what has a value."""
+    estimates = tuple(
+        msgspec.structs.replace(found, reason=against[found.name])
+        if found.value is not None and found.name in against
+        else found
+        for found in result.estimates
+    )
+    return msgspec.structs.replace(result, estimates=estimates)
+
+
+def _implausible(estimate: ParameterEstimate, vehicle: VehicleParameters) -> str:
+    """Return why no road vehicle has this value, or any of its interval where that is wide."""
+    tried = [estimate]
+    if estimate.value is None:
+        return ""
+    if estimate.reason:
+        ends = (estimate.low, estimate.high)
+        tried += [msgspec.structs.replace(estimate, value=end) for end in ends]
+    reason = ""
+    for one in tried:
+        try:
+            name, parameter = _parameter(one, vehicle)
+            check_vehicle(msgspec.structs.replace(vehicle, **{name: parameter}), before=vehicle)
+        except ValueError as error:
+            reason = reason or str(error)
+        else:
+            return ""
+    if estimate.name in _TELLING:
+        reason += "; is the unit or the sign of a signal another than was declared?"
+    return reason
+
+
+def _parameter(estimate: ParameterEstimate, vehicle: VehicleParameters) -> tuple[str, Parameter]:
+    """Return the parameter of `vehicle` that an estimate with a value tells, by its name.
+
+    Raises ValueError for an understeer gradient that no front stiffness gives.
+    """
+    assert estimate.value is not None
+    value, std = estimate.value, std_of(estimate)
+    if estimate.name != UNDERSTEER_GRADIENT:
+        return estimate.name, Parameter(value, std)
+    stiffness = front_stiffness(vehicle, value)
+    return STIFFNESS, Parameter(stiffness, abs(stiffness - front_stiffness(vehicle, value + std)))
 
 
 def vehicle_toml(vehicle: VehicleParameters, *, scale: float = 1.0) -> str:

@@ -20,6 +20,7 @@ from foretwin.contracts.tuning import (
 from foretwin.contracts.vehicle import Parameter, VehicleParameters
 from foretwin.geometry.slopes import Slopes
 from foretwin.sim_worker.analysis.identify.acceptance import (
+    STEERING,
     STIFFNESS,
     is_acceptable,
     std_of,
@@ -36,7 +37,6 @@ _WINDOW_NS, _EVERY_NS = 60_000_000_000, 10_000_000_000
 _LEAST_S = 20.0
 _STEP_STDS = 4.0
 """Between two intervals' middles, over their common standard deviation: chance is one in 16,000."""
-_STEERING = {"steering_ratio", "steering_offset_rad", UNDERSTEER_GRADIENT}
 _CHECK_NS, _LOOK_BACK_NS = 2_000_000_000, 30_000_000_000
 """How often, and how far back, bends are compared with those before."""
 
@@ -126,9 +126,9 @@ class Tuner(ParametersInForce):
         self._from_ns = since_ns
         self._due_ns = since_ns + round(_LEAST_S * 1e9)
         names = set(noticed)
-        if names & _STEERING:
+        if names & set(STEERING):
             # One of them cannot be told without the others.
-            names |= _STEERING
+            names |= set(STEERING)
             self._known, self._doubted = None, False
         for name in names:
             self._taken.pop(name, None)
@@ -162,7 +162,7 @@ class Tuner(ParametersInForce):
         """Let what `result` says count; later bends are compared with those that it is of."""
         changes = super().take(result)
         bends, known = self._bends, self._known
-        steered = any(change.name in _STEERING or change.name == STIFFNESS for change in changes)
+        steered = any(change.name in STEERING or change.name == STIFFNESS for change in changes)
         if steered and bends is not None and (known is None or not bends.knows_less(known)):
             self._known = bends
         return changes

@@ -19,7 +19,7 @@ from foretwin.contracts.tuning import (
 from foretwin.contracts.vehicle import Parameter, VehicleParameters
 from foretwin.geometry.slopes import Slopes
 from foretwin.sim_worker.analysis.identify import longitudinal
-from foretwin.sim_worker.analysis.identify.acceptance import HALF_OF_95
+from foretwin.sim_worker.analysis.identify.acceptance import ALONG, HALF_OF_95, judged
 from foretwin.sim_worker.analysis.identify.actuator import fit_following
 from foretwin.sim_worker.analysis.identify.road_grade import grade_from_altitude, grade_from_roads
 from foretwin.sim_worker.analysis.identify.steering import SteeringFit, fit_steering, steering_map
@@ -128,7 +128,7 @@ def examine(
         steering_map=bins,
         excited_s=turned_s + worked_s,
     )
-    return Examined(result, fit)
+    return Examined(judged(result, vehicle), fit)
 
 
 def _steering_priors(vehicle: VehicleParameters) -> dict[str, float]:
@@ -225,10 +225,6 @@ def _following(record: MotionRecord, vehicle: VehicleParameters) -> list[Paramet
     ]
 
 
-_ALONG = ("drive_gain", "brake_gain", "drag_npv2", "rolling_resistance_n", "accel_delay_s")
-"""In the order of a `LongitudinalFit`."""
-
-
 def _grade(record: MotionRecord, roads: Slopes | None) -> Array:
     """Return the road's grade: by altitude, which tells it better, or else by the map."""
     try:
@@ -242,7 +238,7 @@ def _grade(record: MotionRecord, roads: Slopes | None) -> Array:
 def _longitudinal(
     record: MotionRecord, vehicle: VehicleParameters, grade: Array | None, roads: Slopes | None
 ) -> tuple[list[ParameterEstimate], float]:
-    priors: dict[str, Parameter] = {name: getattr(vehicle, name) for name in _ALONG}
+    priors: dict[str, Parameter] = {name: getattr(vehicle, name) for name in ALONG}
     try:
         if record.has("command_accel_mps2") and grade is None:
             grade = _grade(record, roads)

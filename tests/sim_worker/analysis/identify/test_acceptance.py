@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import msgspec
 import pytest
 
 from foretwin.contracts.tuning import Identification, ParameterEstimate
-from foretwin.sim_worker.analysis.identify.acceptance import accepted, vehicle_toml
+from foretwin.sim_worker.analysis.identify.acceptance import accepted, judged, vehicle_toml
 from foretwin.sim_worker.analysis.identify.window import UNDERSTEER_NAME
 from foretwin.sim_worker.vehicle.parameters import (
     bundled_vehicles,
@@ -43,6 +44,33 @@ def test_a_value_without_a_reason_against_it_is_taken() -> None:
 )
 def test_what_speaks_against_itself_is_left(given: Identification) -> None:
     assert accepted(given, load_vehicle()) == (load_vehicle(), ())
+
+
+def test_what_no_vehicle_has_is_said_and_brings_down_what_was_told_along_with_it() -> None:
+    """A gyro whose sign is wrong turns ratio and offset around."""
+    several = (
+        told("steering_ratio", -15.4, 0.1),
+        told("steering_offset_rad", -0.004, 1e-4),
+        told(UNDERSTEER_NAME, 1e-4, 1e-4),
+        told("drive_gain", 0.95, 0.01),
+    )
+    given = msgspec.structs.replace(
+        several[0], estimates=tuple(one.estimates[0] for one in several)
+    )
+    ratio, offset, gradient, gain = judged(given, load_vehicle()).estimates
+    assert ratio.reason.startswith("steering_ratio -15.4 is implausible; it must be 1 to 40; ")
+    assert offset.reason == gradient.reason
+    assert offset.reason == "it was told along with steering_ratio, which is wrong"
+    assert (ratio.value, offset.value, gain.reason) == (-15.4, -0.004, "")
+    assert [change.name for change in accepted(given, load_vehicle())[1]] == ["drive_gain"]
+
+
+@pytest.mark.parametrize(("half", "wrong"), [(5.0, True), (40.0, False)])
+def test_a_wide_interval_is_no_vehicles_where_all_of_it_is_not(half: float, wrong: bool) -> None:
+    given = told("steering_ratio", 54.0, half, reason="the interval is wide")
+    (found,) = judged(given, load_vehicle()).estimates
+    assert ("implausible" in found.reason) is wrong
+    assert found.reason
 
 
 def test_what_is_pinned_stays() -> None:

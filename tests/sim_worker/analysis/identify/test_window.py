@@ -78,6 +78,16 @@ def test_intervals_hold_a_good_part_of_how_the_two_wheels_are_steered() -> None:
         assert 0.55 * moved < one.half_widths[index] < 1.2 * moved
 
 
+def test_a_gyro_of_the_other_sign_tells_nothing_of_the_steering() -> None:
+    record = city_minute()
+    mirrored = record._replace(yaw_rate_radps=-record.yaw_rate_radps)
+    told = identify(mirrored, load_vehicle(), vehicle_id="standin")
+    assert "steering_ratio -15." in estimate(told, "steering_ratio").reason
+    for name in ("steering_offset_rad", UNDERSTEER_NAME):
+        assert "steering_ratio, which is wrong" in estimate(told, name).reason
+    assert estimate(told, "drive_gain").reason == ""
+
+
 def test_a_stretch_that_begins_in_motion_or_with_gaps_tells_as_much() -> None:
     whole = city_minute()
     moving = np.flatnonzero(whole.speed_mps > 5.0)[0]
