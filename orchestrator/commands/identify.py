@@ -6,19 +6,25 @@ import contextlib
 import math
 import textwrap
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import msgspec
 import numpy as np
 
-from foretwin.contracts.drive import GnssFix
+from foretwin.contracts.drive import GnssFix, VehicleInfo
 from foretwin.contracts.errors import UserError
 from foretwin.contracts.frames import GeoPoint, LocalFrame
 from foretwin.contracts.new_folder import named_in_errors, new_files, trouble_with_folder
 from foretwin.contracts.tuning import Identification
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.orchestrator.commands.told import CommandResult
-from foretwin.sim_worker.analysis.identify.acceptance import accepted, is_acceptable, vehicle_toml
+from foretwin.sim_worker.analysis.gap.sensors_by_positions import accused_sensors, are_precise
+from foretwin.sim_worker.analysis.identify.acceptance import (
+    accepted,
+    doubted,
+    is_acceptable,
+    vehicle_toml,
+)
 from foretwin.sim_worker.analysis.identify.picture import draw_estimates, draw_steering
 from foretwin.sim_worker.analysis.identify.window import UNDERSTEER_NAME, identify
 from foretwin.sim_worker.analysis.motion_record import MotionRecord, MotionRecorder
@@ -33,7 +39,7 @@ _STANDS_MPS = 0.5
 _WIDTH = 80
 _ROW = "{:<21}{:>9}  {:<20} {:<13}{:>9} {:1}"
 _DEGREES = math.degrees(1.0)
-_SHOWN = {
+SHOWN = {
     "steering_ratio": ("steering ratio", "", 1.0),
     "steering_offset_rad": ("steering offset", "° at the tyre", _DEGREES),
     UNDERSTEER_NAME: ("understeer gradient", "mrad per m/s²", 1e3),
@@ -60,8 +66,12 @@ def identify_log(
     if out is not None and (trouble := trouble_with_folder(out)) is not None:
         raise UserError(f"--out {out}: {trouble}")
     vehicle = load_vehicle(vehicle_file)
-    record, vehicle_id = read_record(log_file, declaration=declaration)
-    told = identify(record, vehicle, vehicle_id=vehicle_id)
+    record, info, precise_positions = read_drive(log_file, declaration=declaration)
+    told = identify(record, vehicle, vehicle_id=info.vehicle_id)
+    if precise_positions:
+        ahead_m = 0.0 if info.body_from_antenna_m is None else info.body_from_antenna_m[0]
+        accused = accused_sensors(record, antenna_ahead_m=ahead_m)
+        told = doubted(told, {found.cause: found.text for found in accused})
     written = ["vehicle.toml", "identification.json"]
     if out is not None:
         changed, _ = accepted(told, vehicle, source=f"identified from {log_file.name}")
@@ -83,8 +93,16 @@ def identify_log(
     return CommandResult(as_object(told), "\n".join(lines))
 
 
-def read_record(log_file: Path, *, declaration: Path | None = None) -> tuple[MotionRecord, str]:
-    """Return a log's signals on a grid and its vehicle's id; `declaration` is that of `open_log`.
+class RecordedDrive(NamedTuple):
+    """A log's signals on a grid, its vehicle, and whether positions may accuse other sensors."""
+
+    record: MotionRecord
+    info: VehicleInfo
+    precise_positions: bool
+
+
+def read_drive(log_file: Path, *, declaration: Path | None = None) -> RecordedDrive:
+    """Return what a log holds for identification; `declaration` is that of `open_log`.
 
     Raises UserError for a log of less than a second, of a vehicle that stands or without a sample
     that identification could use, and what `open_log` raises.
@@ -92,7 +110,10 @@ def read_record(log_file: Path, *, declaration: Path | None = None) -> tuple[Mot
     log = open_log(log_file, declaration=declaration)
     recorder: MotionRecorder | None = None
     waiting: list[tuple[str, Any]] = []
+    fixes: list[GnssFix] = []
     for channel, message in log.samples():
+        if isinstance(message, GnssFix):
+            fixes.append(message)
         if recorder is None:
             waiting.append((channel, message))
             if not isinstance(message, GnssFix):
@@ -115,7 +136,7 @@ def read_record(log_file: Path, *, declaration: Path | None = None) -> tuple[Mot
         )
     if record.time_s[-1] < _LONG_S:
         record = recorder.record(period_s=_FINE_S)
-    return record, log.info.vehicle_id
+    return RecordedDrive(record, log.info, are_precise(fixes))
 
 
 def _recorder(place: GeoPoint, waiting: list[tuple[str, Any]]) -> MotionRecorder:
@@ -139,16 +160,17 @@ def as_lines(told: Identification, vehicle: VehicleParameters) -> list[str]:
     duration_s = (told.stamp_ns - told.from_stamp_ns) * 1e-9
     lines = [f"{duration_s:.0f} s of {told.vehicle_id}", ""]
     lines.append(_ROW.format("", "value", "95 % interval", "unit", "file", "").rstrip())
+    above = ""
     for found in told.estimates:
-        name, unit, scale = _SHOWN[found.name]
+        name, unit, scale = SHOWN[found.name]
         interval = "" if found.low is None else _interval(found.low, found.high, scale)
         taken = "*" if is_acceptable(found) else ""
         value, prior = _number(found.value, scale), _number(found.prior, scale)
         lines.append(_ROW.format(name, value, interval, unit, prior, taken).rstrip())
         if found.reason:
-            lines += textwrap.wrap(
-                found.reason, _WIDTH, initial_indent="    ", subsequent_indent="    "
-            )
+            said = "as above" if found.reason == above else found.reason
+            lines += textwrap.wrap(said, _WIDTH, initial_indent="    ", subsequent_indent="    ")
+        above = found.reason
     if told.steering_map:
         lines += ["", "steering ratio by speed"]
     for entry in told.steering_map:

@@ -91,10 +91,9 @@ def consistency_of(pairs: SignalPairs) -> Consistency:
     if motion is not None:
         hard_bends = np.where(hard, by_measured, np.nan)
         motion_hard = _mean_ratio(hard_bends, real, period_s=PERIOD_S, least_s=0.6)
-    ground, wheels = pairs.ground_mps[::_EVERY], pairs.wheel_mps[::_EVERY]
     return Consistency(
-        gyro_by_course=_turn_rates(pairs),
-        speed_by_gnss=_mean_ratio(ground, wheels, period_s=_EVERY * PERIOD_S, least_s=1.5),
+        gyro_by_course=gyro_by_course(pairs.course_radps, pairs.gyro_radps, pairs.ground_mps),
+        speed_by_gnss=speed_by_gnss(pairs.ground_mps, pairs.wheel_mps),
         measured_by_command=measured,
         model_by_command=model,
         model_stops_at_rad=_stop(pairs.commanded_rad, pairs.done_rad, pairs.model_tire_rad),
@@ -145,13 +144,18 @@ def _turning(model: Array, real: Array) -> Line | None:
     return _line(model, real) if widest > _MIN_CURVATURE_PM else None
 
 
-def _turn_rates(pairs: SignalPairs) -> Line | None:
-    """Fit how the gyro goes with the course's rate; without a bend its bias alone.
+def speed_by_gnss(ground_mps: Array, wheel_mps: Array) -> Line | None:
+    """Fit how the measured speed (N,) goes with that over ground; None for less than 1.5 s."""
+    ground, wheels = ground_mps[::_EVERY], wheel_mps[::_EVERY]
+    return _mean_ratio(ground, wheels, period_s=_EVERY * PERIOD_S, least_s=1.5)
+
+
+def gyro_by_course(course_radps: Array, gyro_radps: Array, ground_mps: Array) -> Line | None:
+    """Fit how the gyro (N,) goes with the course's rate; without a bend its bias alone.
 
     Positions may be stamped late: on the way into a bend that looks like a bias.
     """
-    changes = np.gradient(pairs.gyro_radps) / PERIOD_S
-    signals = (pairs.course_radps, pairs.gyro_radps, changes, pairs.ground_mps)
+    signals = (course_radps, gyro_radps, np.gradient(gyro_radps) / PERIOD_S, ground_mps)
     columns = np.stack([one[::_EVERY] for one in signals])
     course, gyro, changes, ground_mps = columns[:, np.isfinite(columns).all(axis=0)]
     seconds = len(course) * _EVERY * PERIOD_S

@@ -63,9 +63,9 @@ def findings_of(seen: Consistency) -> Finding | None:
     Sensors are judged before actuators, and these before the model: a wrong sensor makes
     whatever is compared with it look wrong.
     """
-    found = speed_sensor(seen)
+    found = speed_sensor(seen.speed_by_gnss)
     if found is None and (seen.excited_s >= _SETTLED_S or seen.moved_s >= 2.0):
-        found = _gyro_sensor(seen)
+        found = gyro_sensor(seen.gyro_by_course)
     if found is not None:
         return found
     if seen.excited_s >= _LEAST_EXCITED_S:
@@ -100,9 +100,8 @@ def _offset(name: str, line: Line, text: str) -> Evidence:
     return _evidence(name, line.offset, 0.0, line.offset_std, text)
 
 
-def speed_sensor(seen: Consistency) -> Finding | None:
+def speed_sensor(speed: Line | None) -> Finding | None:
     """Return what is wrong with the measured speed, None where positions do not contradict it."""
-    speed = seen.speed_by_gnss
     if speed is None or abs(speed.gain - 1.0) <= _SPEED_GAIN + 3.0 * speed.gain_std:
         return None
     said = f"wheel speed is {speed.gain:.2f} times the speed of the positions"
@@ -111,8 +110,8 @@ def speed_sensor(seen: Consistency) -> Finding | None:
     return Finding("vehicle", "speed_sensor", text, (_of("speed_by_gnss", speed, said),))
 
 
-def _gyro_sensor(seen: Consistency) -> Finding | None:
-    gyro = seen.gyro_by_course
+def gyro_sensor(gyro: Line | None) -> Finding | None:
+    """Return what is wrong with the gyro, None where positions do not contradict it."""
     if gyro is None:
         return None
     if gyro.gain_std < 0.15 and abs(gyro.gain - 1.0) > GAIN_LEFT_OPEN + 2.5 * gyro.gain_std:

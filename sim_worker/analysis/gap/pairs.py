@@ -132,7 +132,7 @@ def pairs_of(
     sharp = np.abs(arc) > _FULL_LOCK_RAD
     sensors: dict[str, Any] = dict.fromkeys(_SENSORS, np.full(len(speed), np.nan))
     if precise_positions:
-        sensors = _sensors(record, antenna_ahead_m)
+        sensors = sensor_signals(record, antenna_ahead_m)
     return SignalPairs(
         stamp_ns=record.stamp_ns,
         moves=moves,
@@ -170,8 +170,11 @@ def _change(values: Array, half: int) -> Array:
 _SENSORS = ("course_radps", "gyro_radps", "ground_mps", "wheel_mps")
 
 
-def _sensors(record: MotionRecord, ahead_m: float) -> dict[str, Any]:
-    """Return rate of the course and gyro, speed over ground and of the wheels."""
+def sensor_signals(record: MotionRecord, ahead_m: float) -> dict[str, Array]:
+    """Return rate of the course and gyro, speed over ground and of the wheels, each (N,).
+
+    `record` is one of `PERIOD_S`, with its antenna `ahead_m` of the body's origin.
+    """
     half = _COURSE_HALF
     dx, dy = _change(record.x_m, half), _change(record.y_m, half)
     gone = np.hypot(dx, dy) / (2 * half * PERIOD_S)

@@ -9,9 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from foretwin.contracts.arrays import Array
 from foretwin.contracts.drive import GnssFix, VehicleInfo
-from foretwin.contracts.frames import GeoPoint, LocalFrame, local_from_geo
+from foretwin.contracts.frames import LocalFrame
 from foretwin.contracts.gap import Verdict
 from foretwin.contracts.simulation import HORIZONS_S
 from foretwin.contracts.vehicle import VehicleParameters
@@ -26,6 +25,7 @@ from foretwin.sim_worker.analysis.gap.findings import (
 )
 from foretwin.sim_worker.analysis.gap.free_run import FreeRunner, RunMemory
 from foretwin.sim_worker.analysis.gap.pairs import SignalPairs, pairs_of
+from foretwin.sim_worker.analysis.gap.sensors_by_positions import are_precise
 from foretwin.sim_worker.analysis.motion_record import MotionRecord, MotionRecorder
 
 WINDOW_S, RECENT_S, EVERY_S = 6.0, 3.0, 0.2
@@ -37,10 +37,6 @@ _LATEST_S = 0.1
 _AT_ONCE = 4
 """So many runs are new in each stretch."""
 _IN_A_ROW = 2
-_DENSE_S, _PRECISE_M = 0.25, 0.15
-"""Positions this near to each other and this good may accuse another sensor."""
-_OF_MEDIAN = 1.0 / 0.6745
-"""A normal deviation by the median of what is off."""
 _SPEED_NOISE_MPS = 0.4
 """Such positions tell speeds over 0.6 s to 0.35 m/s: what is farther off is not the same speed."""
 _AGREES_AGAIN = 30
@@ -82,10 +78,7 @@ class FaultDetector:
         self._agreed = 0
         """In so many stretches in a row."""
         self._pending: tuple[str, str, int, int] | None = None
-        self._frame = frame
-        self._fixes: deque[tuple[float, ...]] = deque(maxlen=40)
-        """Stamps, what they say they are good to, and where they are."""
-        self._position: GeoPoint | None = None
+        self._fixes: deque[GnssFix] = deque(maxlen=40)
         self._reported: dict[tuple[str, str], int] = {}
         self.undecided: str = ""
         """What departs without saying whether it is the car or the model, empty where nothing."""
@@ -108,13 +101,9 @@ class FaultDetector:
         if newest is not None and stamp_ns < newest - 2_000_000_000:
             return None  # the clock ran back: what is kept would no longer be one motion
         if isinstance(message, GnssFix):
-            place = message.position
-            if place == self._position:
+            if self._fixes and message.position == self._fixes[-1].position:
                 return None  # said again: whatever the stamp, it is of before
-            self._position = place
-            std_m = np.inf if message.std_m is None else message.std_m
-            here = local_from_geo(self._frame, place.lat_deg, place.lon_deg).tolist()
-            self._fixes.append((stamp_ns, std_m, *here))
+            self._fixes.append(message)
         self.recorder.handle(channel, message)
         newest = self.recorder.newest_stamp_ns
         if newest is None:
@@ -129,7 +118,7 @@ class FaultDetector:
         if to_ns - from_ns < 1.5e9:
             return None
         record = without_manual_commands(self.recorder.record(from_ns, to_ns))
-        precise = self._precise()
+        precise = are_precise(self._fixes)
         pairs = pairs_of(
             record,
             self._runner,
@@ -155,7 +144,7 @@ class FaultDetector:
     def _hold_speed_against_positions(self, seen: Consistency) -> None:
         if seen.speed_by_gnss is None:
             return
-        if speed_sensor(seen) is not None:
+        if speed_sensor(seen.speed_by_gnss) is not None:
             self._speed_agrees, self._agreed = False, 0
         elif confirmed(seen.speed_by_gnss) and seen.speed_by_gnss.residual < _SPEED_NOISE_MPS:
             self._agreed += 1
@@ -163,15 +152,6 @@ class FaultDetector:
                 self._speed_agrees = True
         else:
             self._agreed = 0
-
-    def _precise(self) -> bool:
-        """Whether positions are dense and good enough to judge other sensors by."""
-        if len(self._fixes) < 4:
-            return False
-        table = np.array(self._fixes, dtype=np.float64)
-        apart_s = float(np.median(np.diff(table[:, 0]))) * 1e-9
-        said_m = float(np.median(table[:, 1]))
-        return apart_s <= _DENSE_S and max(said_m, _scatter_m(table)) <= _PRECISE_M
 
     def _weigh(self, findings: Sequence[Finding], to_ns: int) -> Verdict | None:
         for key, seen_ns in list(self._reported.items()):
@@ -207,18 +187,6 @@ class FaultDetector:
             evidence=found.evidence,
             confidence=_confidence(found),
         )
-
-
-def _scatter_m(fixes: Array) -> float:
-    """Return how far fixes (N, 4), as `FaultDetector` keeps them, lie beside those around them.
-
-    By second differences, of which half are those of a car that goes steadily on.
-    """
-    apart = np.diff(fixes[:, 0])
-    step = np.diff(fixes[:, 2:], axis=0)
-    ratio = (apart[1:] / apart[:-1])[:, None]
-    beside = (step[1:] - ratio * step[:-1]) / np.sqrt(1.0 + ratio**2 + (1.0 + ratio) ** 2)
-    return float(np.median(np.abs(beside))) * _OF_MEDIAN
 
 
 def _found_in(pairs: SignalPairs, seen: Consistency) -> Finding | None:

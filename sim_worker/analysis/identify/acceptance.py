@@ -33,6 +33,12 @@ _TELLING = {"steering_ratio": STEERING, "drive_gain": ALONG, "brake_gain": ALONG
 """Where one of these is no vehicle's, the signals are not what they are said to be, and nothing
 that was fitted along with it is right."""
 
+_RESTING_ON = {
+    "speed_sensor": (*STEERING, "wheelbase_m", *ALONG),
+    "gyro_sensor": (*STEERING, "wheelbase_m"),
+}
+"""What is told by a sensor. Of a gyro, speeding up asks no more than what bends take of it."""
+
 
 def is_acceptable(estimate: ParameterEstimate) -> bool:
     """Return whether an estimate has a value and nothing speaks against it."""
@@ -106,6 +112,20 @@ def judged(result: Identification, vehicle: VehicleParameters) -> Identification
             for name in _TELLING.get(estimate.name, ()):
                 against.setdefault(name, f"it was told along with {estimate.name}, which is wrong")
             against[estimate.name] = reason
+    return _with_reasons(result, against)
+
+
+def doubted(result: Identification, wrong: Mapping[str, str]) -> Identification:
+    """Return an identification in which nothing may be taken that rests on a sensor in `wrong`.
+
+    That says what is wrong, by `speed_sensor` and `gyro_sensor`.
+    """
+    against: dict[str, str] = {}
+    for sensor, reason in wrong.items():
+        for name in _RESTING_ON[sensor]:
+            against.setdefault(name, reason)
+    if wrong:
+        result = msgspec.structs.replace(result, steering_map=())
     return _with_reasons(result, against)
 
 

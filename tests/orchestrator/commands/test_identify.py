@@ -10,9 +10,11 @@ from pathlib import Path
 import msgspec
 import pytest
 
-from foretwin.contracts.drive import SpeedSample
+from foretwin.contracts.drive import ImuSample, SpeedSample
 from foretwin.orchestrator.commands.cli import run
+from foretwin.orchestrator.commands.identify import SHOWN
 from foretwin.sim_worker.vehicle.parameters import load_vehicle
+from foretwin.sim_worker.vehicle.plausible import PLAUSIBLE
 from foretwin.telemetry.logs.write_mcap import create
 from tests.telemetry.standin_drive import whole_drive
 
@@ -52,6 +54,39 @@ def test_json_holds_each_parameter_with_its_interval_and_reason(
         assert getattr(tuned, name).value == pytest.approx(expected)
     assert json.loads((out / "identification.json").read_text())["estimates"]
     assert tuned.steering_delay_s.source.startswith("identified from drive.mcap")
+
+
+@pytest.mark.parametrize("positions", [True, False], ids=["with positions", "without"])
+@pytest.mark.parametrize(("speed_gain", "gyro_gain"), [(1.0, 1.0), (3.6, 1.0), (1.0, -1.0)])
+def test_what_has_a_star_is_what_the_file_holds(
+    positions: bool,
+    speed_gain: float,
+    gyro_gain: float,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    log, out = tmp_path / "drive.mcap", tmp_path / "out"
+    drive = whole_drive()
+    with create(log, info=drive.source.info) as writer:
+        for channel, message in drive.samples:
+            if isinstance(message, SpeedSample):
+                message = msgspec.structs.replace(message, speed_mps=speed_gain * message.speed_mps)
+            if isinstance(message, ImuSample):
+                rates = (*message.rate_radps[:2], gyro_gain * message.rate_radps[2])
+                message = msgspec.structs.replace(message, rate_radps=rates)
+            if channel != "plan" and (positions or channel != "gnss"):
+                writer.add(channel, message)
+    assert run(["identify", str(log), "--out", str(out)]) == 0
+    table = capsys.readouterr().out
+    rows = re.findall(r"^(\S.*?)  +.*\*$", table, re.MULTILINE)
+    by_row = {"understeer gradient": "front_cornering_stiffness_npr"}
+    by_row |= {row: name for name, (row, *_) in SHOWN.items() if row not in by_row}
+    tuned = load_vehicle(out / "vehicle.toml")
+    held = {name for name in PLAUSIBLE if "identified" in getattr(tuned, name).source}
+    assert {by_row[row] for row in rows} == held
+    faulty = speed_gain * gyro_gain != 1.0
+    assert ("steering_ratio" not in held) is faulty
+    assert ("disagrees with its positions" in table) is (faulty and positions)
 
 
 def test_what_was_written_is_named_and_no_plot_that_was_not(

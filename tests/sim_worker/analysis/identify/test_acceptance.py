@@ -8,7 +8,13 @@ import msgspec
 import pytest
 
 from foretwin.contracts.tuning import Identification, ParameterEstimate
-from foretwin.sim_worker.analysis.identify.acceptance import accepted, judged, vehicle_toml
+from foretwin.sim_worker.analysis.identify.acceptance import (
+    accepted,
+    doubted,
+    is_acceptable,
+    judged,
+    vehicle_toml,
+)
 from foretwin.sim_worker.analysis.identify.window import UNDERSTEER_NAME
 from foretwin.sim_worker.vehicle.parameters import (
     bundled_vehicles,
@@ -63,6 +69,25 @@ def test_what_no_vehicle_has_is_said_and_brings_down_what_was_told_along_with_it
     assert offset.reason == "it was told along with steering_ratio, which is wrong"
     assert (ratio.value, offset.value, gain.reason) == (-15.4, -0.004, "")
     assert [change.name for change in accepted(given, load_vehicle())[1]] == ["drive_gain"]
+
+
+@pytest.mark.parametrize(
+    ("sensor", "left"),
+    [("speed_sensor", {"steering_lag_s"}), ("gyro_sensor", {"steering_lag_s", "drive_gain"})],
+)
+def test_nothing_is_taken_that_rests_on_a_sensor_in_doubt(sensor: str, left: set[str]) -> None:
+    names = ("steering_ratio", "wheelbase_m", "steering_lag_s", "drive_gain")
+    ratio = told("steering_ratio", 15.4, 0.1)
+    several = tuple(
+        msgspec.structs.replace(ratio.estimates[0], name=name, value=1.0) for name in names
+    )
+    silent = msgspec.structs.replace(several[1], value=None, reason="no tyre angle was measured")
+    given = msgspec.structs.replace(ratio, estimates=(several[0], silent, *several[2:]))
+    found = doubted(given, {sensor: "it disagrees"}).estimates
+    assert {one.name for one in found if is_acceptable(one)} == left
+    assert found[0].reason == "it disagrees"
+    assert found[1].reason == "no tyre angle was measured"
+    assert doubted(given, {}) == given
 
 
 @pytest.mark.parametrize(("half", "wrong"), [(5.0, True), (40.0, False)])
