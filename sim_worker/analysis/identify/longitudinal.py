@@ -3,7 +3,8 @@
 On the road, e a = G_d u⁺ - G_b u⁻ - (c v² + R)/m - g sin(grade), with the effective mass factor e,
 the command u of `accel_delay_s` ago, drive and brake gains G, drag c and rolling resistance R.
 Acceleration is the slope of the measured speed: an accelerometer would feel the body's pitch. In a
-bend it contains what the turned front wheels take, F_yf sin(δ), up to 0.2 m/s² in town. What is
+bend it contains what the turned front wheels take, F_yf sin(δ), up to 0.2 m/s² in town; in sharp
+ones, near full lock, tyres scrub and take more than this tells, and they are left out. What is
 left is noise of the measured speed: over 6 s it averages out as white noise does.
 """
 
@@ -24,7 +25,12 @@ from foretwin.sim_worker.analysis.identify.regression import (
     smoothed,
     smoothed_and_rate,
 )
-from foretwin.sim_worker.analysis.identify.steering_signals import SLOWEST_MPS, WIDTH_S, sideways
+from foretwin.sim_worker.analysis.identify.steering_signals import (
+    SLOWEST_MPS,
+    WIDTH_S,
+    sideways,
+    turns_sharply,
+)
 from foretwin.sim_worker.analysis.motion_record import MotionRecord
 from foretwin.sim_worker.vehicle.parameters import GRAVITY_MPS2
 
@@ -61,7 +67,8 @@ def _first_order(values: Array, *, period_s: float, lag_s: float) -> Array:
 
 
 def _cornering(record: MotionRecord, vehicle: VehicleParameters, speed_mps: Array) -> Array:
-    """Return the deceleration (N,) of a single-track car that turns and rolls freely."""
+    """Return the deceleration (N,) of a single-track car that turns and rolls freely, NaN where it
+    turns so sharply that it is none."""
     if not record.has("yaw_rate_radps"):
         return np.zeros(len(speed_mps))
     period_s = float(record.time_s[1])
@@ -70,7 +77,8 @@ def _cornering(record: MotionRecord, vehicle: VehicleParameters, speed_mps: Arra
     side = sideways(vehicle, speed_mps, rate, turning, period_s=period_s)
     ahead = np.arctan2(side.speed_mps + (base - rear) * rate, np.maximum(speed_mps, SLOWEST_MPS))
     slip = side.front_mps2 * vehicle.mass_kg.value / vehicle.front_cornering_stiffness_npr.value
-    return np.asarray(side.front_mps2 * np.sin(ahead + slip) - rate * side.speed_mps)
+    slowing = side.front_mps2 * np.sin(ahead + slip) - rate * side.speed_mps
+    return np.where(turns_sharply(vehicle, speed_mps, rate), np.nan, slowing)
 
 
 def _spinning_s(vehicle: VehicleParameters, speed_mps: Array) -> Array:

@@ -22,7 +22,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from foretwin.contracts.arrays import Array, Indices
+from foretwin.contracts.arrays import Array, Flags, Indices
 from foretwin.contracts.vehicle import VehicleParameters
 from foretwin.sim_worker.analysis.identify.regression import smoothed_and_rate
 from foretwin.sim_worker.analysis.motion_record import MotionRecord
@@ -38,7 +38,7 @@ _MAX_LATERAL_MPS2 = 4.0
 _MAX_TIRE_RAD = 0.25
 """Beyond it, an axle's two wheels are not one: steered alike, by 0.25 they turn a car as one would
 by 1.5 % less, by 0.58 by 8 %; how nearly each points across the way to the bend's middle no file
-says."""
+says, nor what the two that scrub take of the car's speed."""
 _ALIKE_PER_RAD2 = 0.24
 """So much less of its angle do wheels that are steered alike turn a car by, times its square."""
 _LEAST_FEED = 0.2
@@ -160,7 +160,7 @@ def steering_signals(record: MotionRecord, vehicle: VehicleParameters) -> Steeri
     base = vehicle.wheelbase_m.value
     known = np.isfinite(wheel) & np.isfinite(side.accel_mps2)
     moving = known & (speed > SLOWEST_MPS) & (np.abs(side.accel_mps2) < _MAX_LATERAL_MPS2)
-    moving &= base * np.abs(rate) < math.tan(_MAX_TIRE_RAD) * speed
+    moving &= ~turns_sharply(vehicle, speed, rate)
     if not moving.any():
         raise ValueError("the car did not drive")
     used = np.flatnonzero(moving)
@@ -191,6 +191,12 @@ def steering_signals(record: MotionRecord, vehicle: VehicleParameters) -> Steeri
         gyro_bias_radps=bias,
         gyro_bias_std_radps=bias_std,
     )
+
+
+def turns_sharply(vehicle: VehicleParameters, speed_mps: Array, yaw_rate_radps: Array) -> Flags:
+    """Return where (N,) the file's car turns too sharply for a single-track model."""
+    base = vehicle.wheelbase_m.value
+    return np.asarray(base * np.abs(yaw_rate_radps) >= math.tan(_MAX_TIRE_RAD) * speed_mps)
 
 
 class Sideways(NamedTuple):

@@ -83,13 +83,17 @@ def random_parameters(random: np.random.Generator) -> StandinParameters:
 
 
 def random_path(
-    random: np.random.Generator, parameters: StandinParameters, *, length_m: float = 700.0
+    random: np.random.Generator,
+    parameters: StandinParameters,
+    *,
+    length_m: float = 700.0,
+    radii_m: tuple[float, float] = (12.0, 40.0),
 ) -> DrivenPath:
-    """Return streets with bends of 12 to 40 m radius, and a stop or two."""
+    """Return streets with bends of these radii, and a stop or two."""
     x, y, yaw = 0.0, 0.0, 0.0
     points = [(x, y)]
     while len(points) < length_m:
-        radius = random.uniform(12.0, 40.0)
+        radius = random.uniform(*radii_m)
         turn = random.choice([-1.0, 1.0]) * random.uniform(0.8, 1.6)
         for length, curvature in (
             (random.uniform(30.0, 90.0), 0.0),

@@ -17,7 +17,15 @@ from foretwin.sim_worker.analysis.identify.window import UNDERSTEER_NAME, identi
 from foretwin.sim_worker.analysis.motion_record import MotionRecord
 from foretwin.sim_worker.vehicle.parameters import load_vehicle
 from foretwin.telemetry.standin.parameters import read_parameters
-from tests.sim_worker.standin_drives import city_minute, estimate, straight_minute
+from tests.sim_worker.analysis.identify.coverage import random_path
+from tests.sim_worker.standin_drives import (
+    MINUTE_S,
+    city_minute,
+    driven,
+    estimate,
+    recorded,
+    straight_minute,
+)
 
 COVERS = (
     "foretwin.sim_worker.analysis.identify.actuator",
@@ -86,6 +94,18 @@ def test_a_gyro_of_the_other_sign_tells_nothing_of_the_steering() -> None:
     for name in ("steering_offset_rad", UNDERSTEER_NAME):
         assert "steering_ratio, which is wrong" in estimate(told, name).reason
     assert estimate(told, "drive_gain").reason == ""
+
+
+def test_tyres_that_scrub_near_full_lock_are_not_taken_for_drag_and_gains() -> None:
+    parameters = read_parameters()
+    path = random_path(np.random.default_rng(2), parameters, radii_m=(5.0, 7.0))
+    drive = driven(path, parameters, seed=2, end_s=MINUTE_S)
+    told = identify(recorded(drive.samples), load_vehicle(), vehicle_id="standin")
+    for name, truth in (("drive_gain", CAR.drive_gain), ("brake_gain", CAR.brake_gain)):
+        found = estimate(told, name)
+        assert found.reason == ""
+        assert found.value == pytest.approx(truth, rel=0.03), name
+    assert estimate(told, "drag_npv2").value == pytest.approx(CAR.drag_npv2, abs=0.2)
 
 
 def test_a_stretch_that_begins_in_motion_or_with_gaps_tells_as_much() -> None:
