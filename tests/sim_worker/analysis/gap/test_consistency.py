@@ -195,11 +195,12 @@ def test_a_gyro_that_is_late_leaves_no_lateral_acceleration_missing() -> None:
 
 
 def test_a_lag_with_another_gain_is_none() -> None:
-    """Into a bend that goes on: the model follows at once, and turns a little less."""
-    real = 0.07 / (1.0 + np.exp(-3.0 * (TIME_S - 3.5))) + 0.002 * TIME_S
-    model = 0.065 / (1.0 + np.exp(-3.5 * (TIME_S - 3.5)))
+    """Three seconds into a bend that goes on: the car turns more, and longer."""
+    since_s = np.where(TIME_S < 3.0, np.nan, TIME_S - 3.0)
+    real = 0.0712 - 0.0545 * np.exp(-since_s / 0.4)
+    model = 0.0653 - 0.0545 * np.exp(-since_s / 0.3)
     seen = consistency_of(turning(real_pm=real, model_pm=model))
-    late = consistency_of(turning(real_pm=model, model_pm=shifted(model, 0.3)))
+    late = consistency_of(turning(real_pm=TYRES_RAD, model_pm=shifted(TYRES_RAD, 0.2)))
     assert seen.motion_lag is not None
     assert late.motion_lag is not None
-    assert (seen.motion_lag.seconds, late.motion_lag.seconds) == (0.0, pytest.approx(0.3))
+    assert (seen.motion_lag.seconds, late.motion_lag.seconds) == (0.0, pytest.approx(0.2))
