@@ -42,5 +42,5 @@ def between_commands(age_s: Array) -> BetweenCommands:
     next_one = np.searchsorted(begins, np.arange(count), side="right")
     then = np.append(begins, count - 1)[next_one]
     apart_s = age_s[np.maximum(then - 1, 0)] + PERIOD_S - age_s[then]
-    rare = (next_one < len(begins)) & (apart_s > _SENT_S) & (apart_s < _RARE_S)
+    rare = (apart_s > _SENT_S) & (apart_s < _RARE_S)
     return BetweenCommands(age_s, then, age_s / np.where(rare, apart_s, 1.0), rare)

@@ -15,7 +15,6 @@ from foretwin.sim_worker.analysis.gap.fitting import (
     DelayedLine,
     Line,
     delayed_line,
-    joint_fit,
     late_line,
     line_through,
 )
@@ -179,13 +178,8 @@ def gyro_by_course(course_radps: Array, gyro_radps: Array, ground_mps: Array) ->
     heard = independent / (len(weight) * float(np.sum(weight**2)))
     apart = gyro - course
     std = float(np.sqrt(np.sum(weight * (apart - np.sum(weight * apart)) ** 2)))
-    late = joint_fit(
-        apart,
-        np.stack([np.ones(len(apart)), changes], axis=1),
-        variance=max(std, 1e-9) ** 2 / (heard * np.maximum(weight, 1e-12)),
-        prior_std=np.array([np.inf, _POSITIONS_LATE_S]),
-    )
-    return Line(1.0, np.inf, float(late.sizes[0]), float(late.std[0]), std, 0.0)
+    offset = float(np.sum(weight * apart))
+    return Line(1.0, np.inf, offset, std / float(np.sqrt(heard)), std, 0.0)
 
 
 def _missing(pairs: SignalPairs) -> float:

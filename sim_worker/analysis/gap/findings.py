@@ -119,9 +119,7 @@ def gyro_sensor(gyro: Line | None) -> Finding | None:
         said += " (its sign is wrong?)" if gyro.gain < 0.0 else ""
         text = f"the car's gyro disagrees with its positions: {said}"
         return Finding("vehicle", "gyro_sensor", text, (_of("gyro_by_course", gyro, said),))
-    # Where the gain is as unsure as that, positions are late, or the bend is all that there was.
-    one = abs(gyro.gain - 1.0) < GAIN_LEFT_OPEN
-    if one and abs(gyro.offset) > _GYRO_RADPS + 3.0 * gyro.offset_std:
+    if abs(gyro.offset) > _GYRO_RADPS + 3.0 * gyro.offset_std:
         said = f"the gyro shows {gyro.offset:+z.3f} rad/s more than the course over ground turns"
         text = f"the car's gyro disagrees with its positions: {said}"
         return Finding("vehicle", "gyro_sensor", text, (_offset("gyro_offset", gyro, said),))

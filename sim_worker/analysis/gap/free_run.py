@@ -26,7 +26,7 @@ _TICKS_BACK = round(MAX_STEERING_DELAY_S / PERIOD_S) + 1
 _SPEED_GAIN_PS = 4.0
 MIN_TURN_RAD = 0.012
 """Of a tyre's angle: the least turn that steering is compared by."""
-AT_MOST = 0.7
+_AT_MOST = 0.7
 """Of the fastest: tyres that turn by more turn as fast as they can. Chosen."""
 
 
@@ -69,12 +69,8 @@ def outrun(asked_rad: Array, done_rad: Array, *, fastest_radps: float) -> Flags:
         else:
             tire = asked
         behind[k] = abs(tire - asked) > MIN_TURN_RAD
-    return np.asarray(behind & (turns_radps(done_rad) > AT_MOST * fastest_radps))
-
-
-def turns_radps(tire_rad: Array) -> Array:
-    """Return how fast (N,) tyres turn whose angle on the grid is `tire_rad`."""
-    return np.asarray(np.abs(np.gradient(tire_rad)) / PERIOD_S)
+    turns = np.abs(np.gradient(done_rad)) / PERIOD_S
+    return np.asarray(behind & (turns > _AT_MOST * fastest_radps))
 
 
 class FreeRunner:

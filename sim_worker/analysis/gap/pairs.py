@@ -14,14 +14,12 @@ import numpy as np
 from foretwin.contracts.arrays import Array, Flags, Indices, Stamps
 from foretwin.sim_worker.analysis.gap.between_commands import SELDOM_S, between_commands
 from foretwin.sim_worker.analysis.gap.free_run import (
-    AT_MOST,
     MIN_TURN_RAD,
     FreeRunner,
     RunMemory,
     outrun,
     start_states,
     tire_angles,
-    turns_radps,
 )
 from foretwin.sim_worker.analysis.gap.measured_motion import MeasuredMotion
 from foretwin.sim_worker.analysis.gap.push_blocks import BLOCK, PushBlocks, push_blocks
@@ -37,8 +35,6 @@ _SETTLED = round(0.4 / PERIOD_S)
 _SMOOTH_HALF, _COURSE_HALF, _TURN_HALF = 3, round(0.3 / PERIOD_S), round(0.24 / PERIOD_S)
 MOVES_MPS, _ROLLS_MPS = 2.5, 0.5
 """Above them turning, and acceleration and speed alone, say something."""
-_CATCHES_UP = round(0.4 / PERIOD_S)
-"""So long tyres take to where they are commanded to once they turn less fast."""
 _FULL_LOCK_RAD = 0.36
 """Sharper, on less than 7 m, tyres scrub and steering runs out of its line: no model is right, and
 what departs there accuses nobody. Chosen: a car of 2.4 m/s at 0.5 rad lost all of 0.6 m/s²."""
@@ -124,10 +120,6 @@ def pairs_of(
     done = record.wheel_rad / ratio if wheel else signals.measured_rad
     between = between_commands(record.command_age_s)
     asked, commanded = (between.of(one) for one in (asked, signals.commanded_rad))
-    fastest_radps = runner.vehicle.max_tire_rate_radps.value
-    # What was sent between may have been ahead of tyres that turn as fast as they can.
-    hurries = between.rare & (turns_radps(done) > AT_MOST * fastest_radps)
-    hurries = np.convolve(hurries, np.ones(_CATCHES_UP))[: len(hurries)] > 0.0
     arc = np.arctan(runner.vehicle.wheelbase_m.value * rate / np.maximum(speed, MOVES_MPS))
     sharp = np.abs(arc) > _FULL_LOCK_RAD
     sensors: dict[str, Any] = dict.fromkeys(_SENSORS, np.full(len(speed), np.nan))
@@ -143,7 +135,7 @@ def pairs_of(
         speed_mps=speed,
         curvature_pm=np.where(moves & ~sharp, rate / np.maximum(speed, MOVES_MPS), np.nan),
         commanded_rad=commanded,
-        too_fast=outrun(asked, done, fastest_radps=fastest_radps) | hurries,
+        too_fast=outrun(asked, done, fastest_radps=runner.vehicle.max_tire_rate_radps.value),
         rare=between.rare,
         **sensors,
         **_runs(record, runner, memory or RunMemory(), sharp),

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
+from msgspec.structs import replace
 
 from foretwin.contracts.drive import GnssFix
 from foretwin.contracts.frames import GeoPoint
@@ -24,6 +26,18 @@ def test_positions_are_precise_that_are_dense_and_good(
     period_s: float, std_m: float | None, precise: bool
 ) -> None:
     assert are_precise(fixes(period_s=period_s, std_m=std_m)) is precise
+
+
+@pytest.mark.parametrize(("off_m", "precise"), [(0.05, True), (0.5, False)])
+def test_positions_that_lie_beside_one_another_are_not(off_m: float, precise: bool) -> None:
+    """Of a car at 10 m/s in a bend, whatever they say that they are good to."""
+    drawn = np.random.default_rng(1)
+    told = []
+    for count, fix in enumerate(fixes(period_s=0.1, std_m=0.02) * 4):
+        x, y = count + drawn.normal(0.0, off_m), 0.005 * count**2 + drawn.normal(0.0, off_m)
+        place = GeoPoint(48.0 + x / 111_200.0, 11.0 + y / 74_400.0)
+        told.append(replace(fix, stamp_ns=100_000_000 * count, position=place))
+    assert are_precise(told) is precise
 
 
 def test_four_positions_are_the_fewest_that_accuse() -> None:
