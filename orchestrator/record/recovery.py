@@ -18,6 +18,7 @@ from foretwin.contracts.process import is_held
 from foretwin.contracts.segments import DRIVE_FILE, segments_of
 from foretwin.orchestrator.record.derive import derive, streams_in
 from foretwin.orchestrator.record.durable import WRITING, sync_folder
+from foretwin.orchestrator.record.kept_parts import read_removed
 from foretwin.orchestrator.record.kept_rows import kept_rows
 from foretwin.orchestrator.record.recovered_record import recovered_record
 from foretwin.orchestrator.record.results import TABLES
@@ -96,13 +97,14 @@ def recover(
     """
     results = run / RESULTS
     if not results.is_dir():
-        raise UserError(f"{run}: no folder of a run")
+        gone = f"its {RESULTS}/ is gone" if (run / RECORD).exists() else "no folder of a run"
+        raise UserError(f"{run}: {gone}")
     with run_lock(run):
         record = read_record(run)
         _let_leave(run)
         torn = [file for file in segments_of(run / DRIVE_FILE) if not look_through(file).ended]
         if record and not is_unfinished(run) and not torn:
-            parts = tuple(_in_parquet(results))
+            parts = (*_in_parquet(results), *_gone_recording(run, record))
             healthy = not any(part.lost for part in parts)
             return Recovery(str(record.get("exit")), parts, healthy, record)
         try:
@@ -113,7 +115,7 @@ def recover(
             streams = streams_in(results)
             recordings = map(_mended, segments_of(run / DRIVE_FILE))
             there = _in_parquet(results, but={stream.stem for stream in streams})
-            parts = (*there, *_derived(results), *recordings)
+            parts = (*there, *_derived(results), *recordings, *_gone_recording(run, record))
             agreement = None if judged is None else judged.record
             record = _completed(run, record, parts, agreement, torn=bool(torn))
             write_record(record, run / RECORD)
@@ -172,8 +174,17 @@ def _in_parquet(results: Path, *, but: Container[str] = ()) -> Iterator[Part]:
             with parquet_file(file) as table:
                 rows = sum(batch.num_rows for batch in table.iter_batches())
             yield Part(f"{file.stem}: {rows} rows, as they were")
-        except (OSError, pa.ArrowException) as error:
+        except OSError as error:
             yield Part(f"{file.stem}: lost: {one_line(error)}", lost=True)
+        except pa.ArrowException:
+            yield Part(f"{file.stem}: lost: {file.name} is cut off or damaged", lost=True)
+
+
+def _gone_recording(run: Path, record: Mapping[str, Any]) -> Iterator[Part]:
+    """Tell where a drive recorded its car and no part of that is there, nor was put away."""
+    telemetry = (record.get("ledger") or {}).get("telemetry") or {}
+    if telemetry.get("recorded") and not (segments_of(run / DRIVE_FILE) or read_removed(run)):
+        yield Part(f"{DRIVE_FILE}: lost: it is gone", lost=True)
 
 
 def _mended(file: Path) -> Part:

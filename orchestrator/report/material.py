@@ -50,6 +50,10 @@ FUTURE_COLUMNS = (
 TableRow = dict[str, Any]
 
 
+_BREAKS_OFF_S = 2.0
+"""A kill of the recorder may cost a second of what it had."""
+
+
 class KeptWorlds:
     """The Worlds that a run or a sweep left, each read when it is first asked for."""
 
@@ -154,6 +158,11 @@ class RunMaterial:
             said.append("the table of futures is missing")
         if part_of(self.record, "ledger", "telemetry", "recorded") and not self.recorded.states:
             said.append(f"the recording of the car, {DRIVE_FILE}, cannot be read")
+        if self.recorded.states and self.rounds:
+            last_ns = max(state.stamp_ns for state in self.recorded.states)
+            if (before_s := (self.rounds[-1]["stamp_ns"] - last_ns) / 1e9) > _BREAKS_OFF_S:
+                ends = f"ends {before_s:.0f} s before the last round"
+                said.append(f"the recording of the car, {DRIVE_FILE}, {ends}")
         return tuple(said)
 
     @cached_property

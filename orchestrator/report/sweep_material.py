@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 from functools import cached_property
 from operator import itemgetter
@@ -60,9 +61,10 @@ class SweepMaterial:
         """Return all rows with the columns that a report reads, none where none was written;
         UserError where their file is damaged."""
         columns = [*_COLUMNS, *(f"metric_{name}" for name in ROW_METRICS)]
-        try:
+        file: Path | None = None
+        with contextlib.suppress(FileNotFoundError):
             file = table_at(self.folder, "futures")
-        except FileNotFoundError:
+        if file is None or (file.is_dir() and not any(file.glob("*.parquet"))):
             return JOB_TABLES["futures"].empty_table().select(columns)
         try:
             return read_parquet(file, columns)

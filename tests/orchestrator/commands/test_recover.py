@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import json
 import os
+import shutil
 from pathlib import Path
 
 import pytest
@@ -35,6 +37,29 @@ def test_what_is_lost_is_said_and_is_exit_code_3(
 
     assert "\nrounds: 2 rows; a torn end of " in told
     assert told.endswith(f"{run}: recovered; lost in part: 1 of {len(TABLES) + 1}\n")
+
+
+def test_what_is_gone_or_cut_off_is_lost(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    run = killed_run(tmp_path / "run")
+    assert command(["recover", str(run)]) == 0
+    record = json.loads((run / "run.json").read_text())
+    record["ledger"] = {"telemetry": {"published": 5, "recorded": 5, "lost": 0}}
+    (run / "run.json").write_text(json.dumps(record))
+    assert command(["recover", str(run)]) == 0
+    (run / "drive.mcap").unlink()
+    rounds = run / "results" / "rounds.parquet"
+    os.truncate(rounds, rounds.stat().st_size - 8)
+    capsys.readouterr()
+    assert command(["recover", str(run)]) == 3
+    told = capsys.readouterr().out
+
+    assert "rounds: lost: rounds.parquet is cut off or damaged\n" in told
+    assert "drive.mcap: lost: it is gone\n" in told
+    shutil.rmtree(run / "results")
+    assert command(["recover", str(run)]) == 2
+    assert capsys.readouterr().err == f"foretwin: {run}: its results/ is gone\n"
 
 
 def test_what_cannot_be_recovered_is_one_line(

@@ -36,3 +36,15 @@ def test_without_a_round_the_recording_says_when_the_drive_began(tmp_path: Path)
     assert run.start_stamp_ns == 0
     assert run.track is not None
     assert run.track.time_s.tolist() == [20.0, 30.0]
+
+
+def test_a_recording_that_ends_before_the_rounds_do_is_said(tmp_path: Path) -> None:
+    def unread(last_round_s: float) -> tuple[str, ...]:
+        run = RunMaterial(told_run(tmp_path / str(last_round_s)))
+        last_ns = round(last_round_s * 1e9)
+        run.rounds = [{"round_id": 0, "stamp_ns": last_ns, "drive_time_s": last_round_s}]
+        run.recorded = driven(20.0, 30.0, 39.0)
+        return run.unread
+
+    assert unread(40.0) == ()
+    assert unread(45.0) == ("the recording of the car, drive.mcap, ends 6 s before the last round",)

@@ -41,6 +41,12 @@ def page(swept: Path) -> str:
     return html_of(report_of_folders([swept]))
 
 
+def test_a_sweep_that_placed_nothing_has_no_rows(tmp_path: Path) -> None:
+    (tmp_path / "sweep.json").write_text(json.dumps({"scenarios": []}))
+    (tmp_path / "rows").mkdir()
+    assert SweepMaterial(tmp_path).futures.num_rows == 0
+
+
 @pytest.mark.judge
 def test_it_tells_outcomes_and_stands_alone(swept: Path, page: str) -> None:
     read, record = ReadPage(page), json.loads((swept / "sweep.json").read_text())
