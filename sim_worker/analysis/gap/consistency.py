@@ -31,6 +31,7 @@ _LEAST_STOP_S = 0.3
 _SPEEDS_TOGETHER_S = 0.4
 """For so long, speeds and courses from positions err alike."""
 _CLOCKS_APART_S = 0.16
+"""Of steering and gyro: more would cost the ends of a stretch, and a verdict time. Chosen."""
 _POSITIONS_LATE_S = 0.1
 """How late positions may be stamped (standard deviation): receivers take up to 0.2 s."""
 _LEAST_TURN_RADPS = 0.03
@@ -177,15 +178,15 @@ def gyro_by_course(course_radps: Array, gyro_radps: Array, ground_mps: Array) ->
     weight = ground_mps**2 / np.sum(ground_mps**2)
     heard = independent / (len(weight) * float(np.sum(weight**2)))
     apart = gyro - course
-    std = float(np.sqrt(np.sum(weight * (apart - np.sum(weight * apart)) ** 2)))
     offset = float(np.sum(weight * apart))
+    std = float(np.sqrt(np.sum(weight * (apart - offset) ** 2)))
     return Line(1.0, np.inf, offset, std / float(np.sqrt(heard)), std, 0.0)
 
 
 def _missing(pairs: SignalPairs) -> float:
     """Return the RMS of the lateral acceleration between model and car in bends, NaN in none.
 
-    It is that of clocks up to 0.2 s apart with which they agree best.
+    Clocks may be `_CLOCKS_APART_S` apart: it is that with which they agree best.
     """
     real, model = (
         np.where(pairs.excited, one, np.nan) * pairs.speed_mps**2

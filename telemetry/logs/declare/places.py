@@ -15,7 +15,7 @@ from foretwin.contracts.arrays import Array, Flags, Indices
 from foretwin.contracts.frames import GeoPoint, LocalFrame, geo_from_ecef, local_from_geo
 from foretwin.telemetry.logs import units
 from foretwin.telemetry.logs.declare.motion import FASTEST_MPS, GridMotion, changes, motion_of
-from foretwin.telemetry.logs.declare.names import FEET
+from foretwin.telemetry.logs.declare.names import FEET, called
 from foretwin.telemetry.logs.log import LogError
 
 _LEAST_P90_MPS = 1.5
@@ -84,7 +84,6 @@ def places_of(columns: dict[str, Array], time_s: Array) -> list[list[Place]]:
     # Plain degrees as minutes, and a heading beside them, move as a car does now and then.
     if plain := [place for place in angles if place.unit in _PLAIN_ANGLES]:
         return [plain]
-    # Last: of many columns thousands of pairs move as a car does in some unit of length.
     plane = _plane(lively, time_s, new, of_utm=False)
     return [found for found in (angles, plane) if found]
 
@@ -225,6 +224,8 @@ def _plane(columns: dict[str, Array], time_s: Array, new: _Changes, *, of_utm: b
             kind, fields, found = "projected", {"easting": east, "northing": north}, grid
             if math.hypot(x_m, y_m) < _FAR_M:
                 kind, fields, found = "local", {"x": east, "y": north}, near
+                if not called(fields):  # any two are a way in some unit, as a speed and a course
+                    continue
             elif unit not in ("m", "ft"):
                 continue
             if _moves_like_a_car(time_s[rows], xy_m):

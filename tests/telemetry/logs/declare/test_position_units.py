@@ -127,6 +127,16 @@ def test_lengths_in_a_plane_need_not_be_metres(tmp_path: Path, unit: str, per_m:
     assert f'x = {{ column = "x", unit = "{unit}" }}' in read_again(path, origin=zero)
 
 
+def test_a_speed_and_a_course_are_no_way_in_a_plane(tmp_path: Path) -> None:
+    """They move as a car does, in some unit of length; where it is stands in letters."""
+    columns = drive_columns()
+    lat, lon = (columns.pop(name) for name in ("lat", "lon"))
+    course = np.degrees(np.arctan2(np.gradient(lon), np.gradient(lat)))
+    path = written(tmp_path, columns | {"Kurs": course % 360.0})
+    with pytest.raises(LogError, match="no columns that move as a car does"):
+        propose(path, country_of=country)
+
+
 @pytest.mark.parametrize(("east", "north"), [("y_e", "x_n"), ("Y (East)", "X (North)"), ("e", "n")])
 def test_east_and_north_in_names_count_more_than_x_and_y(
     tmp_path: Path, east: str, north: str
